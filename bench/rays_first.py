@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# rays_first -- training by rays from the first step beside splats first, at equal time; and training on fisheyes and panoramas beside
-# pinholes.
+# rays_first -- training by rays from the first step beside splats first, at equal time; and training on fisheyes, panoramas and rolling
+# shutters beside pinholes.
 #
 #     python3 bench/rays_first.py PHOTOS -o DIR [--budget 42s] [--seeds 3] [--gbtrace build/release/gbtrace]
 #
-# PHOTOS holds the data sets plush, fox, castle and aerial; the courtyard is made by `gbtrace make-scene`, also as a fisheye of 180 degrees and
-# as a panorama, with as many pixels. Each run goes into DIR/NAME and is not repeated when it is there. Two tables go to stdout: per scene the
+# PHOTOS holds the data sets plush, fox, castle and aerial; the courtyard is made by `gbtrace make-scene`, also as a fisheye of 180 degrees, as
+# a panorama and by moving cameras, with as many pixels. Each run goes into DIR/NAME and is not repeated when it is there. Two tables go to stdout: per scene the
 # mean and the range over seeds of PSNR, SSIM and steps; per lens the same, and what a step cost. Let nothing else run meanwhile: 5 scenes, 2
-# ways, 3 seeds at 42 s take 25 minutes, the lenses 12.
+# ways, 3 seeds at 42 s take 25 minutes, the lenses 15. With --iterations N the lenses' runs are of so many steps: scores at equal pixels.
 import argparse
 import json
 import os
@@ -20,6 +20,7 @@ parser.add_argument("photos")
 parser.add_argument("-o", "--output", required=True)
 parser.add_argument("--budget", default="42s")
 parser.add_argument("--seeds", type=int, default=3)
+parser.add_argument("--iterations", type=int, help="lenses only, in place of the budget")
 parser.add_argument("--gbtrace", default="build/release/gbtrace")
 args = parser.parse_args()
 gbtrace = os.path.abspath(args.gbtrace)
@@ -44,10 +45,11 @@ def load(run, file):
 
 def train(data, name, seed, *words):
     """Scores of a run, and what is in its train.json."""
-    run = f"{name}_{args.budget}_{seed}"
+    length = ("--iterations", str(args.iterations)) if args.iterations else ("--budget", args.budget)
+    run = f"{name}_{length[1]}_{seed}"
     if not os.path.exists(os.path.join(args.output, run, "metrics.json")):
         print(run, file=sys.stderr)
-        call("train", data, "-o", run, "--budget", args.budget, "--seed", str(seed), "--overwrite", *words)
+        call("train", data, "-o", run, *length, "--seed", str(seed), "--overwrite", *words)
     return load(run, "metrics.json"), load(run, "train.json")
 
 
@@ -65,8 +67,9 @@ seeds = range(1, args.seeds + 1)
 pinhole = make_scene("courtyard", "--width", "320", "--height", "240")
 scenes = {name: os.path.abspath(os.path.join(args.photos, name)) for name in ("plush", "fox", "castle", "aerial")}
 scenes["courtyard"] = pinhole
-print("| scene | training | PSNR | SSIM | steps |\n|---|---|---|---|---|")
-for scene, data in scenes.items():
+if not args.iterations:
+    print("| scene | training | PSNR | SSIM | steps |\n|---|---|---|---|---|")
+for scene, data in () if args.iterations else scenes.items():
     large = ("--downscale", "1.33333") if scene != "courtyard" else ()
     ways = {"rays from the first step": (), "splats first": ("--splats-until", "0.7")}
     runs = {way: [] for way in ways}
@@ -79,7 +82,8 @@ for scene, data in scenes.items():
 
 lenses = {"pinhole": pinhole,
           "fisheye of 180 degrees": make_scene("courtyard_fisheye", "--lens", "fisheye", "--width", "277", "--height", "277"),
-          "panorama": make_scene("courtyard_panorama", "--lens", "panorama", "--width", "392", "--height", "196")}
+          "panorama": make_scene("courtyard_panorama", "--lens", "panorama", "--width", "392", "--height", "196"),
+          "rolling shutter": make_scene("courtyard_rolling", "--lens", "rolling", "--width", "320", "--height", "240")}
 print("\n| lens | training | PSNR | SSIM | steps | build, trace and adjoint, ms a step |\n|---|---|---|---|---|---|")
 for lens, data in lenses.items():
     runs = [train(data, f"{os.path.basename(data)}_rays", seed) for seed in seeds]

@@ -89,6 +89,7 @@ static const scene_lens lenses[] = {
     [GBT_MAKE_SCENE_DISTORTED] = {GBT_CAMERA_OPENCV, " --lens distorted", "OPENCV with distortion"},
     [GBT_MAKE_SCENE_FISHEYE] = {GBT_CAMERA_FISHEYE, " --lens fisheye", "FISHEYE"},
     [GBT_MAKE_SCENE_PANORAMA] = {GBT_CAMERA_EQUIRECTANGULAR, " --lens panorama", "EQUIRECTANGULAR"},
+    [GBT_MAKE_SCENE_ROLLING] = {GBT_CAMERA_PINHOLE, " --lens rolling", "PINHOLE with rolling shutters"},
 };
 enum { LENSES = sizeof lenses / sizeof *lenses };
 
@@ -115,6 +116,7 @@ static void set_lens(const recipe *r, const gbt_make_scene_def *def, gbt_camera 
     camera->model = lenses[def->lens].model;
     switch (def->lens) {
     case GBT_MAKE_SCENE_PINHOLE:
+    case GBT_MAKE_SCENE_ROLLING:
     case GBT_MAKE_SCENE_DISTORTED:
         memcpy(camera->params, perspective,
                (def->lens == GBT_MAKE_SCENE_DISTORTED ? 8 : 4) * sizeof *perspective);
@@ -126,6 +128,17 @@ static void set_lens(const recipe *r, const gbt_make_scene_def *def, gbt_camera 
         memcpy(camera->params, panorama, sizeof panorama);
         break;
     }
+}
+
+/* While row after row is read out the camera moves by some hundredths of its distance from the target, and
+   turns by some degrees: a phone in a hand that does not stop for the photo. */
+static void roll(const gbt_make_scene_def *def, int view, double distance, gbt_camera *camera)
+{
+    static const double move = 0.02, turn = 0.02; /* std-dev; of the distance, and radians */
+    camera->shutter = GBT_CAMERA_SHUTTER_ROWS;
+    for (int k = 0; k < 6; k++)
+        camera->motion[k] = (k < 3 ? move * distance : turn) *
+                            rng_normal(def->seed, STREAM_CAMERA + 6 + (uint64_t)k, (uint64_t)view);
 }
 
 /** View number `view` of `def`: on one of the rings, looking at the target, both moved a little. */
@@ -153,6 +166,8 @@ static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, i
     }
     const double up[3] = {0, 0, 1};
     double right[3], down[3];
+    if (def->lens == GBT_MAKE_SCENE_ROLLING)
+        roll(def, view, dvec_length(forward), &camera);
     dvec_normalize(forward);
     dvec_cross(forward, up, right);
     dvec_normalize(right);
@@ -224,6 +239,7 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
                               gbt_error *err)
 {
     char path[PATH_SIZE], text[4096], gaussians[32] = "";
+    const bool rolls = def->lens == GBT_MAKE_SCENE_ROLLING;
     if (def->gaussians > 0)
         snprintf(gaussians, sizeof gaussians, " --gaussians %d", def->gaussians);
     GBT_TRY(file_join(path, sizeof path, folder, "SCENE.md", err));
@@ -235,14 +251,15 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
         "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
         "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s%s\n\n"
         "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
-        "- `sparse/0/`: cameras (%s, exact poses) and at most %d points in COLMAP's binary format. "
+        "- `%s`: cameras (%s, exact poses) and at most %d points%s. "
         "A point lies on a surface that at least\n"
         "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 "
         "pixels of noise; 1 point in 100 is an outlier.\n"
         "%s",
         r->name, r->about, r->name, def->width, def->height, def->view_count, def->points, def->point_noise,
         def->samples, def->seed, def->depth ? " --depth" : "", lenses[def->lens].option, gaussians,
-        def->view_count, def->width, def->height, lenses[def->lens].about, def->points, def->point_noise,
+        def->view_count, def->width, def->height, rolls ? "transforms.json`, `points.ply" : "sparse/0/",
+        lenses[def->lens].about, def->points, rolls ? "" : " in COLMAP's binary format", def->point_noise,
         def->depth ? "- `depth/`: float EXR, distance along the ray through each pixel's centre to "
                      "the first surface, scene units; 0 where there is none.\n"
                    : "");

@@ -15,13 +15,12 @@ static const float same_color = 0.06f;
 
 bool photo_ray(const gbt_camera *camera, double px, double py, float origin[3], float dir[3])
 {
-    double in_camera[3], in_world[3];
-    if (!gbt_camera_unproject(camera, px, py, in_camera))
+    double start[3], forward[3];
+    if (!gbt_camera_ray(camera, px, py, start, forward))
         return false;
-    dmat_apply_transposed(camera->rotation, in_camera, in_world);
     for (int k = 0; k < 3; k++) {
-        origin[k] = (float)camera->center[k];
-        dir[k] = (float)in_world[k];
+        origin[k] = (float)start[k];
+        dir[k] = (float)forward[k];
     }
     return true;
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/sparse.c -- chosen pixels -> surface points -> tracks -> COLMAP files. */
+/* scenes/sparse.c -- chosen pixels -> surface points -> tracks -> files of cameras and points. */
 #include "scenes/sparse.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -13,6 +14,8 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "data/colmap_write.h"
+#include "data/ply.h"
+#include "data/transforms_write.h"
 #include "scenes/photo.h"
 
 /* Streams of random numbers; photos use 1 to 10000 (photo.c), cameras 2^24 and after (make_scene.c). */
@@ -79,20 +82,22 @@ typedef struct search {
 static bool sees(const search *q, size_t view, const double point[3], const float normal[3])
 {
     const gbt_camera *camera = q->cameras + view;
-    double to_point[3], in_camera[3], pixel[2];
+    double to_point[3], pixel[2];
     for (int k = 0; k < 3; k++)
         to_point[k] = point[k] - camera->center[k];
     if (q->sight > 0 && dvec_length(to_point) > (double)q->sight)
         return false;
-    dmat_apply(camera->rotation, to_point, in_camera);
-    if (!gbt_camera_project(camera, in_camera, pixel))
+    if (!gbt_camera_pixel(camera, point, pixel))
         return false;
     if (!(pixel[0] >= 0 && pixel[0] < camera->width && pixel[1] >= 0 && pixel[1] < camera->height))
         return false;
+    const gbt_camera at = gbt_camera_at(camera, pixel[0], pixel[1]);
+    for (int k = 0; k < 3; k++)
+        to_point[k] = point[k] - at.center[k];
     const double distance = dvec_length(to_point);
     float origin[3], dir[3];
     for (int k = 0; k < 3; k++) {
-        origin[k] = (float)camera->center[k];
+        origin[k] = (float)at.center[k];
         dir[k] = (float)(to_point[k] / distance);
     }
     if (-(dir[0] * normal[0] + dir[1] * normal[1] + dir[2] * normal[2]) < least_cosine)
@@ -139,12 +144,7 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
 /** Where a view saw the true point: its projection and the detector's noise. */
 static void observe(const search *q, size_t candidate, size_t view, double pixel[2])
 {
-    const gbt_camera *camera = q->cameras + view;
-    double in_camera[3];
-    for (int k = 0; k < 3; k++)
-        in_camera[k] = q->tracks[candidate - q->first].point[k] - camera->center[k];
-    dmat_apply(camera->rotation, in_camera, in_camera);
-    gbt_camera_project(camera, in_camera, pixel);
+    gbt_camera_pixel(q->cameras + view, q->tracks[candidate - q->first].point, pixel);
     for (int k = 0; k < 2; k++)
         pixel[k] +=
             observation_noise_px * rng_normal(q->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
@@ -180,14 +180,10 @@ static double reprojection_error(const search *q, size_t candidate, const double
     double sum = 0;
     int count = 0;
     for (size_t v = 0; v < q->view_count; v++) {
-        const gbt_camera *camera = q->cameras + v;
-        double in_camera[3], projected[2], observed[2];
+        double projected[2], observed[2];
         if (q->seen[(candidate - q->first) * q->view_count + v] == 0)
             continue;
-        for (int k = 0; k < 3; k++)
-            in_camera[k] = position[k] - camera->center[k];
-        dmat_apply(camera->rotation, in_camera, in_camera);
-        if (!gbt_camera_project(camera, in_camera, projected))
+        if (!gbt_camera_pixel(q->cameras + v, position, projected))
             continue;
         observe(q, candidate, v, observed);
         sum += dvec_length2(projected[0] - observed[0], projected[1] - observed[1]);
@@ -264,6 +260,43 @@ static void refer_to_tracks(cloud *c)
     }
 }
 
+static gbt_status write_colmap(cloud *c, const gbt_camera *cameras, const char *const *names,
+                               size_t view_count, const char *folder, gbt_error *err)
+{
+    char path[4096];
+    refer_to_tracks(c);
+    for (size_t v = 0; v < view_count; v++)
+        c->images[v] = (colmap_image){names[v], cameras[v], c->observation_count[v], c->observations[v]};
+    GBT_TRY(file_join(path, sizeof path, folder, "sparse/0", err));
+    GBT_TRY(file_make_folder(path, err));
+    return colmap_write(path, c->images, view_count, c->points, c->point_count, err);
+}
+
+/* Cameras that move while they are read out, which no COLMAP model holds. */
+static gbt_status write_transforms(const cloud *c, const gbt_camera *cameras, const char *const *names,
+                                   size_t view_count, const char *folder, gbt_error *err)
+{
+    char path[4096];
+    float *position = mem_alloc(c->point_count, 3 * sizeof *position, "sparse points", err),
+          *color = mem_alloc(c->point_count, 3 * sizeof *color, "sparse points", err);
+    gbt_status status = position == NULL || color == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (size_t i = 0; i < c->point_count && status == GBT_OK; i++)
+        for (size_t k = 0; k < 3; k++) {
+            position[3 * i + k] = (float)c->points[i].position[k];
+            color[3 * i + k] = (float)c->points[i].color[k] / 255;
+        }
+    if (status == GBT_OK)
+        status = file_join(path, sizeof path, folder, "points.ply", err);
+    if (status == GBT_OK)
+        status = ply_write(
+            path, &(ply_cloud){.vertex_count = c->point_count, .position = position, .color = color}, err);
+    mem_free(position);
+    mem_free(color);
+    GBT_TRY(status);
+    GBT_TRY(file_join(path, sizeof path, folder, "transforms.json", err));
+    return transforms_write(path, names, cameras, view_count, "points.ply", err);
+}
+
 gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
                         size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
                         double point_noise, float sight, uint64_t seed, const char *folder, gbt_error *err)
@@ -297,15 +330,8 @@ gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *c
     }
     if (status != GBT_OK)
         goto done;
-    refer_to_tracks(&c);
-    for (size_t v = 0; v < view_count; v++)
-        c.images[v] = (colmap_image){names[v], cameras[v], c.observation_count[v], c.observations[v]};
-    char path[4096];
-    status = file_join(path, sizeof path, folder, "sparse/0", err);
-    if (status == GBT_OK)
-        status = file_make_folder(path, err);
-    if (status == GBT_OK)
-        status = colmap_write(path, c.images, view_count, c.points, c.point_count, err);
+    status = camera_is_still(&cameras[0]) ? write_colmap(&c, cameras, names, view_count, folder, err)
+                                          : write_transforms(&c, cameras, names, view_count, folder, err);
 done:
     cloud_free(&c, view_count);
     mem_free(q.tracks);

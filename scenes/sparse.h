@@ -24,7 +24,8 @@ typedef struct sparse_seed {
 void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t wanted, sparse_seed *out);
 
 /**
- * Follow the chosen points to the surfaces, find the views that see them, and write folder/sparse/0.
+ * Follow the chosen points to the surfaces, find the views that see them, and write folder/sparse/0; for
+ * cameras that move while they are read out folder/transforms.json and points.ply.
  *
  * @param seeds [view_count][per_view]
  * @param names [view_count]

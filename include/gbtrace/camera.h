@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gbtrace/camera.h -- a posed camera: lens model, image size, pose.
+/* gbtrace/camera.h -- a posed camera: lens model, image size, pose, and how it moves while it is read out.
 
    Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height] and the
    centre of the top-left pixel is (0.5, 0.5). Lens formulas: docs/cameras.md. */
@@ -39,12 +39,22 @@ typedef enum gbt_camera_model {
 
 enum { GBT_CAMERA_MAX_PARAMS = 16 };
 
+/** Which pixels of an image are taken at the same time. */
+typedef enum gbt_camera_shutter {
+    GBT_CAMERA_SHUTTER_GLOBAL, /* all, the default */
+    GBT_CAMERA_SHUTTER_ROWS,   /* those of a row: a rolling shutter */
+    GBT_CAMERA_SHUTTER_COLUMNS /* those of a column */
+} gbt_camera_shutter;
+
 typedef struct gbt_camera {
     gbt_camera_model model;
     int width, height;                    /* pixels, > 0 */
     double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order; lengths in pixels */
     double rotation[9];                   /* world to camera, row-major, orthonormal, det +1 */
     double center[3];                     /* camera centre, world (scene-local) units */
+    gbt_camera_shutter shutter; /* with a rolling one, the pose is that of the image's middle, and */
+    double motion[6]; /* the camera's while the image is read out, edge to edge, downwards or to the right,
+                         even and along a line, as gbt_camera_moved() takes it */
 } gbt_camera;
 
 /** How many models there are, and the one of a place in their list, 0 to count - 1. */
@@ -72,11 +82,21 @@ bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double
 /**
  * The ray through a point of the image, in world axes.
  *
- * @param origin [out] the camera centre; for an orthographic camera the point of its plane through the centre
+ * @param origin [out] the camera centre (with a rolling shutter: when that point is taken); for an
+ *                     orthographic camera the point of its plane through the centre
  * @param dir    [out] unit vector; both untouched on failure
  * @return as gbt_camera_unproject()
  */
 bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3]);
+
+/**
+ * Image point of a point of the world: the inverse of gbt_camera_ray(). With a rolling shutter it is found by
+ * steps, each from the pose of the point found before; where the camera moves so fast that it sees a point
+ * twice it is one of the two, or none.
+ *
+ * @return false where the camera does not see the point; `pixel` may lie outside the image
+ */
+bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2]);
 
 /** Image point of a point in camera axes; false where the model does not see it. The formulas that
     gbt_camera_unproject() inverts. */
@@ -89,7 +109,7 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 /**
  * The camera whose pixels are every `step`-th of this one's, in both directions, from pixel (x, y) on: ray
  * (i, j) of `out` is ray (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and
- * y are in [0, step).
+ * y are in [0, step). A rolling shutter goes on over its part of the time.
  *
  * @return false for a model without a principal point (equirectangular), and where no pixel would be left;
  *         `out` is untouched then
@@ -103,6 +123,10 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
  * @return false for a model without a principal point (equirectangular); `out` is untouched then
  */
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
+
+/** The camera of a part of the image: `width` by `height` pixels, the first of which is (x, y) of this one.
+    False as gbt_camera_shifted(). */
+bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out);
 
 /**
  * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
@@ -122,6 +146,10 @@ bool gbt_camera_look_at(const double origin[3], const double target[3], const do
  *                    radians: center + R^T v and exp([omega]x)^T R for a rotation R, [omega]x a = omega x a
  */
 gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
+
+/** The camera as it stands when an image point is taken: without a rolling shutter. Its own copy where it has
+    none. */
+gbt_camera gbt_camera_at(const gbt_camera *camera, double px, double py);
 
 /**
  * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera:

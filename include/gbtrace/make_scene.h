@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* gbtrace/make_scene.h -- procedural scenes whose cameras, surfaces and depths are known exactly, written as
-   a COLMAP data set. */
+   a data set: a COLMAP model, or for rolling shutters a transforms.json. */
 #ifndef GBTRACE_MAKE_SCENE_H
 #define GBTRACE_MAKE_SCENE_H
 
@@ -15,10 +15,11 @@ typedef enum gbt_make_scene_lens {
     GBT_MAKE_SCENE_PINHOLE,   /* PINHOLE, the default */
     GBT_MAKE_SCENE_DISTORTED, /* OPENCV with moderate distortion */
     GBT_MAKE_SCENE_FISHEYE,   /* FISHEYE, 180 degrees across the shorter side */
-    GBT_MAKE_SCENE_PANORAMA   /* EQUIRECTANGULAR, all around; the width should be twice the height */
+    GBT_MAKE_SCENE_PANORAMA,  /* EQUIRECTANGULAR, all around; the width should be twice the height */
+    GBT_MAKE_SCENE_ROLLING    /* PINHOLE with a rolling shutter, row by row, in a hand that moves and turns */
 } gbt_make_scene_lens;
 /** Their names in the order of the enum, as options offer them. */
-#define GBT_MAKE_SCENE_LENS_NAMES "pinhole|distorted|fisheye|panorama"
+#define GBT_MAKE_SCENE_LENS_NAMES "pinhole|distorted|fisheye|panorama|rolling"
 
 typedef struct gbt_make_scene_def {
     const char *name;   /* one of gbt_make_scene_names(). Default "tabletop". */
@@ -48,7 +49,8 @@ const char *gbt_make_scene_summary(const char *name);
 /**
  * Render a procedural scene and write it as a data set that any COLMAP reader takes.
  *
- * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin, SCENE.md (what it
+ * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin (for rolling
+ * shutters transforms.json and points.ply, as instant-ngp reads them), SCENE.md (what it
  * shows and how it was made) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the
  * ray through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
  * nothing is hit; with def->gaussians, gaussians.ply: plain Gaussians of degree 3, 248 bytes each, spread

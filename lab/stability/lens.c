@@ -229,7 +229,7 @@ gbt_status stability_a11(stability *s)
                             "Column of an upright post while the camera moves at 10 m/s: analytic 120 to 60.",
                             "row", "column, px");
     ray_shot shot = ray_shot_of(&camera);
-    shot.shutter = RAY_SHUTTER_ROWS;
+    shot.camera.shutter = GBT_CAMERA_SHUTTER_ROWS;
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_shot(&shot, 0, &rays, s->err)))
         draw_traced(s, &still, &g, &settings, &rays);
     draw_camera(s, &ours, &g, &settings, &camera, &rays);
@@ -237,7 +237,9 @@ gbt_status stability_a11(stability *s)
         changed += memcmp(&ours.rgb.pixels[i], &still.rgb.pixels[i], sizeof(float)) != 0;
     const double apart =
         s->status == GBT_OK ? draw_difference(ours.rgb.pixels, still.rgb.pixels, 3 * WIDTH * HEIGHT) : 0;
-    shot.end.center[0] += speed * readout;
+    /* From the middle of the first row to that of the last; the camera was given for the first. */
+    shot.camera.motion[0] = speed * readout * HEIGHT / (HEIGHT - 1.0);
+    shot.camera.center[0] += 0.5 * speed * readout;
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_shot(&shot, 0, &rays, s->err)))
         draw_traced(s, &ours, &g, &settings, &rays);
     draw_splatted(s, &theirs, &g, &splat, &camera);

@@ -248,7 +248,8 @@ static gbt_status measure_view(bench_scene *s, const char *folder, cross_view *o
    False when it is one already. */
 static bool make_pinhole(ray_shot *shot)
 {
-    const gbt_camera from = shot->camera;
+    gbt_camera from = shot->camera;
+    from.shutter = GBT_CAMERA_SHUTTER_GLOBAL;
     const bool changed = from.model != GBT_CAMERA_SIMPLE_PINHOLE && from.model != GBT_CAMERA_PINHOLE;
     double half[2];
     *shot = ray_shot_of(&from);
@@ -262,7 +263,6 @@ static bool make_pinhole(ray_shot *shot)
         shot->camera.params[k] = 0.5 * side / half[k];
         shot->camera.params[2 + k] = 0.5 * side;
     }
-    shot->end = shot->camera;
     return true;
 }
 

@@ -36,7 +36,7 @@ class CError(c.Structure):
 
 class CCamera(c.Structure):
     _fields_ = [("model", c.c_int), ("width", c.c_int), ("height", c.c_int), ("params", c.c_double * 16), ("rotation", c.c_double * 9),
-                ("center", c.c_double * 3)]
+                ("center", c.c_double * 3), ("shutter", c.c_int), ("motion", c.c_double * 6)]
 
 
 class CGaussians(c.Structure):

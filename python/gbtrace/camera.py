@@ -10,11 +10,15 @@ from gbtrace._library import ArgumentError, CCamera, library, wanted
 
 MODELS = {library.gbt_camera_model_name(i).decode(): i for i in map(library.gbt_camera_model_at, range(library.gbt_camera_model_count()))}
 
+SHUTTERS = ("global", "rows", "columns")  # in the order of gbt_camera_shutter
+
 
 class Camera:
     """COLMAP's axes (x right, y down, z forward), lens models and parameters; docs/cameras.md has them all.
 
-    `rotation` (3 x 3, world to camera), `center` and `params` are views of the camera's own memory: writing into them changes it.
+    `rotation` (3 x 3, world to camera), `center`, `params` and `motion` are views of the camera's own memory: writing into them changes it.
+    With `shutter` "rows" or "columns" the pose is that of the picture's middle, and `motion` how the camera moves (as `moved()` takes it)
+    while the picture is read out, from its top or left edge on.
     """
 
     __slots__ = ("_c",)  # a misspelt name is an error
@@ -78,6 +82,24 @@ class Camera:
     @center.setter
     def center(self, values):
         self.center[:] = values
+
+    @property
+    def shutter(self):
+        return SHUTTERS[self._c.shutter]
+
+    @shutter.setter
+    def shutter(self, value):
+        if value not in SHUTTERS:
+            raise ValueError(f"shutter: {value!r} (wanted one of {', '.join(SHUTTERS)})")
+        self._c.shutter = SHUTTERS.index(value)
+
+    @property
+    def motion(self):
+        return np.ctypeslib.as_array(self._c.motion)
+
+    @motion.setter
+    def motion(self, values):
+        self.motion[:] = values
 
     def looking_at(self, origin, target, up=(0, -1, 0)):
         """The same lens at `origin`, with `target` in the middle of its picture and `up` towards its top."""

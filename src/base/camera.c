@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera.c -- a camera's rays and pixels; the same camera at other sizes. */
+#include <math.h>
+
 #include "base/camera_lens.h"
 #include "base/camera_model.h"
+#include "base/camera_pose.h"
 #include "base/vec.h"
 
 #define PI 3.14159265358979323846
@@ -18,11 +21,12 @@ bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origi
     double start[3], forward[3];
     if (!camera_lens_prepare(camera, &lens) || !camera_lens_unproject(&lens, px, py, forward))
         return false;
+    const gbt_camera at = gbt_camera_at(camera, px, py);
     camera_lens_origin(&lens, px, py, start);
-    dmat_apply_transposed(camera->rotation, start, start);
-    dmat_apply_transposed(camera->rotation, forward, dir);
+    dmat_apply_transposed(at.rotation, start, start);
+    dmat_apply_transposed(at.rotation, forward, dir);
     for (int i = 0; i < 3; i++)
-        origin[i] = camera->center[i] + start[i];
+        origin[i] = at.center[i] + start[i];
     return true;
 }
 
@@ -30,6 +34,33 @@ bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], dou
 {
     camera_lens lens;
     return camera_lens_prepare(camera, &lens) && camera_lens_project(&lens, point_cam, pixel);
+}
+
+static bool pixel_of_pose(const gbt_camera *pose, const camera_lens *lens, const double point[3],
+                          double pixel[2])
+{
+    double cam[3];
+    for (int i = 0; i < 3; i++)
+        cam[i] = point[i] - pose->center[i];
+    dmat_apply(pose->rotation, cam, cam);
+    return camera_lens_project(lens, cam, pixel);
+}
+
+bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2])
+{
+    enum { STEPS_MAX = 50 }; /* each leaves the share of the image's height that the motion moves a point */
+    camera_lens lens;
+    if (!camera_lens_prepare(camera, &lens) || !pixel_of_pose(camera, &lens, point, pixel))
+        return false;
+    for (int i = 0; i < STEPS_MAX && !camera_is_still(camera); i++) {
+        const double before[2] = {pixel[0], pixel[1]};
+        const gbt_camera at = gbt_camera_at(camera, pixel[0], pixel[1]);
+        if (!pixel_of_pose(&at, &lens, point, pixel))
+            return false;
+        if (fabs(pixel[0] - before[0]) + fabs(pixel[1] - before[1]) < 1e-9)
+            return true;
+    }
+    return camera_is_still(camera);
 }
 
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)
@@ -63,7 +94,9 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
     if (gbt_camera_param_count(camera->model) < 3 || step < 1 || camera->width < step ||
         camera->height < step)
         return false;
-    *out = *camera;
+    const double edge = 0.5 - 0.5 * step; /* of the first pixel of `out`, from that of `camera` */
+    *out = camera_reading(camera, x + edge, y + edge, (double)step * (camera->width / step),
+                          (double)step * (camera->height / step));
     out->width = camera->width / step;
     out->height = camera->height / step;
     /* The middle of pixel i of `out`, i + 0.5, is the middle of pixel x + step i of `camera`. */
@@ -76,11 +109,23 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
 
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out)
 {
-    if (!gbt_camera_every(camera, 1, 0, 0, out))
+    if (gbt_camera_param_count(camera->model) < 3)
         return false;
     const int focal_count = camera_focal_count(camera->model);
+    *out = camera_reading(camera, dx, dy, camera->width, camera->height);
     out->params[focal_count] -= dx;
     out->params[focal_count + 1] -= dy;
+    return true;
+}
+
+bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out)
+{
+    gbt_camera shifted;
+    if (!gbt_camera_shifted(camera, x, y, &shifted))
+        return false;
+    *out = camera_reading(&shifted, 0, 0, width, height);
+    out->width = width;
+    out->height = height;
     return true;
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, and on the way
-   between two poses. */
+/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, on the way
+   between two poses, and while its image is read out. */
 #include "base/camera_pose.h"
 
 #include <math.h>
@@ -109,17 +109,90 @@ void camera_motion_at(const camera_motion *motion, double t, double rotation[9],
         center[i] = motion->start_center[i] + t * motion->way[i];
 }
 
-gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6])
+/* `part` of a motion, of a pose: centre + R^T v and exp(omega)^T R. */
+static void move(const double motion[6], double part, double rotation[9], double center[3])
 {
-    gbt_camera out = *camera;
-    double step[3], axis[3] = {motion[3], motion[4], motion[5]}, back[9];
-    dmat_apply_transposed(camera->rotation, motion, step);
-    const double half = 0.5 * dvec_length(axis);
+    double step[3], axis[3] = {motion[3], motion[4], motion[5]}, back[9], moved[9];
+    dmat_apply_transposed(rotation, motion, step);
+    const double half = 0.5 * part * dvec_length(axis);
     dvec_normalize(axis);
     const double s = -sin(half), q[4] = {cos(half), s * axis[0], s * axis[1], s * axis[2]};
     dquat_to_matrix(q, back);
-    multiply(back, camera->rotation, out.rotation);
+    multiply(back, rotation, moved);
+    memcpy(rotation, moved, sizeof moved);
     for (int i = 0; i < 3; i++)
-        out.center[i] += step[i];
+        center[i] += part * step[i];
+}
+
+gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6])
+{
+    gbt_camera out = *camera;
+    move(motion, 1, out.rotation, out.center);
     return out;
+}
+
+bool camera_is_still(const gbt_camera *camera)
+{
+    bool moves = false;
+    for (int i = 0; i < 6; i++)
+        moves = moves || camera->motion[i] != 0;
+    return !moves || camera->shutter == GBT_CAMERA_SHUTTER_GLOBAL;
+}
+
+void camera_pose_during(const gbt_camera *camera, double share, double rotation[9], double center[3])
+{
+    memcpy(rotation, camera->rotation, sizeof camera->rotation);
+    memcpy(center, camera->center, sizeof camera->center);
+    if (share != 0.5 && !camera_is_still(camera))
+        move(camera->motion, share - 0.5, rotation, center);
+}
+
+gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height)
+{
+    gbt_camera out = *camera;
+    if (camera_is_still(camera))
+        return out;
+    const bool by_rows = camera->shutter == GBT_CAMERA_SHUTTER_ROWS;
+    const double all = by_rows ? camera->height : camera->width, first = (by_rows ? y : x) / all,
+                 span = (by_rows ? height : width) / all;
+    double way[3];
+    camera_pose_during(camera, first + 0.5 * span, out.rotation, out.center);
+    dmat_apply_transposed(camera->rotation, camera->motion, way); /* a line in the world */
+    dmat_apply(out.rotation, way, out.motion);
+    for (int i = 0; i < 6; i++)
+        out.motion[i] *= span;
+    return out;
+}
+
+/* Share of the readout in which an image point is taken. */
+static double share_of(const gbt_camera *camera, double px, double py)
+{
+    return camera->shutter == GBT_CAMERA_SHUTTER_ROWS      ? py / camera->height
+           : camera->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? px / camera->width
+                                                           : 0.5;
+}
+
+gbt_camera gbt_camera_at(const gbt_camera *camera, double px, double py)
+{
+    gbt_camera out = *camera;
+    camera_pose_during(camera, share_of(camera, px, py), out.rotation, out.center);
+    out.shutter = GBT_CAMERA_SHUTTER_GLOBAL;
+    memset(out.motion, 0, sizeof out.motion);
+    return out;
+}
+
+bool camera_set_readout(const gbt_camera *start, const gbt_camera *end, gbt_camera_shutter shutter,
+                        double first, double last, gbt_camera *camera)
+{
+    camera_motion way;
+    if (!camera_motion_prepare(start, end, &way))
+        return false;
+    camera_motion_at(&way, 0.5 * (first + last), camera->rotation, camera->center);
+    dmat_apply(camera->rotation, way.way, camera->motion);
+    for (int i = 0; i < 3; i++) {
+        camera->motion[i] *= last - first;
+        camera->motion[3 + i] = -way.angle * way.axis[i] * (last - first);
+    }
+    camera->shutter = shutter;
+    return true;
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_pose.h -- where a camera stands on the way between two poses. */
+/* base/camera_pose.h -- where a camera stands on the way between two poses, and while its image is read out.
+ */
 #ifndef GBT_BASE_CAMERA_POSE_H
 #define GBT_BASE_CAMERA_POSE_H
 
@@ -20,5 +21,25 @@ bool camera_motion_prepare(const gbt_camera *start, const gbt_camera *end, camer
 
 /** World to camera and centre at time t: 0 gives the start's bits, 1 the end to rounding. */
 void camera_motion_at(const camera_motion *motion, double t, double rotation[9], double center[3]);
+
+/** Does the camera stand still while its image is taken? So it does when its motion is zero. */
+bool camera_is_still(const gbt_camera *camera);
+
+/** Pose when the place `share` of the readout is taken: 0 is the top or left edge of the image, 0.5 the
+    camera's own pose, to the bit. */
+void camera_pose_during(const gbt_camera *camera, double share, double rotation[9], double center[3]);
+
+/** The same camera with the pose and motion that it has while a part of its image is read out: `width` by
+    `height` pixels from (x, y) on, which may lie beyond the edges. */
+gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height);
+
+/**
+ * Give `camera` a rolling shutter from two poses (camera_motion): at the top or left edge of the image it is
+ * at time `first` of the way from `start` (0) to `end` (1), at the other edge at time `last`.
+ *
+ * @return as camera_motion_prepare(); `camera` is unchanged on failure
+ */
+bool camera_set_readout(const gbt_camera *start, const gbt_camera *end, gbt_camera_shutter shutter,
+                        double first, double last, gbt_camera *camera);
 
 #endif

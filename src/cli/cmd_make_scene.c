@@ -87,7 +87,7 @@ static const option *options(int *count)
          .value = &def.lens,
          .choices = GBT_MAKE_SCENE_LENS_NAMES,
          .help = "of all cameras; fisheye: 180 degrees across the shorter side; panorama: twice as wide as "
-                 "high"},
+                 "high; rolling: a pinhole that moves while its rows are read out"},
         MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

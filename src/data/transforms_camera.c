@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/transforms_camera.c -- the camera and the pose of one frame of a transforms.json. */
+/* data/transforms_camera.c -- the size and lens of one frame of a transforms.json. */
 #include "data/transforms_camera.h"
 
 #include <math.h>
@@ -204,88 +204,4 @@ gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_c
             p[8] = lens[K3];
     }
     return raw_check_camera(camera, place, err);
-}
-
-/* Columns to an orthonormal matrix, Gram-Schmidt; only called when they nearly are one. */
-static void orthonormalize(double m[9])
-{
-    double column[3][3];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            column[i][k] = m[3 * k + i];
-    dvec_normalize(column[0]);
-    const double along = dvec_dot(column[0], column[1]);
-    for (int k = 0; k < 3; k++)
-        column[1][k] -= along * column[0][k];
-    dvec_normalize(column[1]);
-    dvec_cross(column[0], column[1], column[2]);
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            m[3 * k + i] = column[i][k];
-}
-
-static gbt_status read_matrix(const transforms_frame *s, double m[4][4], gbt_error *err)
-{
-    static const char key[] = "transform_matrix";
-    const json_t *rows = json_object_get(s->frame, key);
-    if (rows == NULL)
-        return transforms_fail(s, err, "is missing", key);
-    const size_t row_count = json_is_array(rows) ? json_array_size(rows) : 0;
-    if (row_count != 3 && row_count != 4)
-        return transforms_fail(s, err, "wanted 3 or 4 rows of 4 numbers", key);
-    for (size_t i = 0; i < 4; i++)
-        for (size_t k = 0; k < 4; k++)
-            m[i][k] = i == k;
-    for (size_t i = 0; i < row_count; i++) {
-        const json_t *row = json_array_get(rows, i);
-        if (!json_is_array(row) || json_array_size(row) != 4)
-            return transforms_fail(s, err, "wanted 3 or 4 rows of 4 numbers", key);
-        for (size_t k = 0; k < 4; k++) {
-            const json_t *value = json_array_get(row, k);
-            if (!json_is_number(value))
-                return transforms_fail(s, err, "holds something that is not a number", key);
-            m[i][k] = json_number_value(value);
-            if (!(fabs(m[i][k]) <= RAW_COORDINATE_LIMIT))
-                return transforms_fail(s, err, "holds a number that is too large", key);
-        }
-    }
-    for (size_t k = 0; k < 4; k++)
-        if (fabs(m[3][k] - (k == 3)) > 1e-3)
-            return transforms_fail(s, err, "last row is not 0 0 0 1 (is the matrix transposed?)", key);
-    return GBT_OK;
-}
-
-gbt_status transforms_pose(const transforms_frame *s, gbt_camera *camera, gbt_error *err)
-{
-    double m[4][4], rotation[9], worst = 0;
-    GBT_TRY(read_matrix(s, m, err));
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++)
-            rotation[3 * i + k] = m[i][k];
-    for (int i = 0; i < 3; i++)
-        for (int k = 0; k < 3; k++) {
-            const double dot = m[0][i] * m[0][k] + m[1][i] * m[1][k] + m[2][i] * m[2][k];
-            worst = fmax(worst, fabs(dot - (i == k)));
-        }
-    if (!(worst <= 1e-3))
-        return base_fail(
-            err, GBT_ERR_FORMAT,
-            "%s: frame %zu: transform_matrix is not a rotation (wanted |R'R - I| <= 1e-3, got %g)",
-            s->file->name, s->frame_index, worst);
-    const double x[3] = {m[0][0], m[1][0], m[2][0]}, y[3] = {m[0][1], m[1][1], m[2][1]},
-                 z[3] = {m[0][2], m[1][2], m[2][2]};
-    double cross[3];
-    dvec_cross(x, y, cross);
-    if (dvec_dot(cross, z) < 0)
-        return transforms_fail(s, err, "is a reflection (wanted determinant +1, got -1)", "transform_matrix");
-    orthonormalize(rotation);
-    for (int i = 0; i < 3; i++) {
-        camera->center[i] = m[i][3];
-        /* Rows of world-to-camera are columns of camera-to-world; y and z change sign between OpenGL's axes
-           and ours. */
-        camera->rotation[0 + i] = rotation[3 * i];
-        camera->rotation[3 + i] = -rotation[3 * i + 1];
-        camera->rotation[6 + i] = -rotation[3 * i + 2];
-    }
-    return GBT_OK;
 }

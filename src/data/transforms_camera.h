@@ -26,7 +26,7 @@ static inline gbt_status transforms_fail(const transforms_frame *s, gbt_error *e
 gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_camera *camera, raw_scene *out,
                              gbt_error *err);
 
-/** Rotation and centre. */
+/** Rotation and centre; with the poses at which the picture was begun and ended, also shutter and motion. */
 gbt_status transforms_pose(const transforms_frame *s, gbt_camera *camera, gbt_error *err);
 
 #endif

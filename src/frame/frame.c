@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -74,8 +75,7 @@ static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 /* What a rasterizer could draw. */
 static bool is_plain_view(const ray_shot *shot)
 {
-    return shot->given == NULL && shot->aperture_radius <= 0 && shot->shutter == RAY_SHUTTER_GLOBAL &&
-           raster_takes(&shot->camera);
+    return shot->given == NULL && shot->aperture_radius <= 0 && raster_takes(&shot->camera);
 }
 
 /* Everything up to the tree, and f->rays through the middle of the aperture. `tracer` is optional. */
@@ -221,7 +221,7 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
     GBT_TRY(ray_shot_check(shot, err));
     if (f->draw.renderer != GBT_RENDERER_TRACE) {
         if (tracer != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
-            shot->shutter != RAY_SHUTTER_GLOBAL)
+            !camera_is_still(&shot->camera))
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "the rasterizer draws what a pinhole camera sees that stands still, and no "
                              "more; trace this picture");

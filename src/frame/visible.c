@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/camera_pose.h"
 #include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
@@ -236,7 +237,7 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
    pixel is divided by the same depth, in the axes of the pose that took it. */
 static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double aperture)
 {
-    return aperture <= 0 || (shot->shutter == RAY_SHUTTER_GLOBAL && camera_lens_looks_forward(&rays->lens));
+    return aperture <= 0 || (camera_is_still(&shot->camera) && camera_lens_looks_forward(&rays->lens));
 }
 
 /* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its

@@ -10,6 +10,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "base/parallel.h"
 #include "base/vec.h"
@@ -70,7 +71,8 @@ static gbt_status check_settings(const raster_settings *s, gbt_error *err)
 
 bool raster_takes(const gbt_camera *camera)
 {
-    return camera->model == GBT_CAMERA_PINHOLE || camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
+    return (camera->model == GBT_CAMERA_PINHOLE || camera->model == GBT_CAMERA_SIMPLE_PINHOLE) &&
+           camera_is_still(camera);
 }
 
 static gbt_status make_view(const gbt_camera *camera, const raster_settings *settings, raster_view *out,
@@ -78,9 +80,11 @@ static gbt_status make_view(const gbt_camera *camera, const raster_settings *set
 {
     const bool one_focal = camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
     if (!raster_takes(camera))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "raster: camera model %d (wanted SIMPLE_PINHOLE or PINHOLE: splats are projected)",
-                         (int)camera->model);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "raster: camera model %d%s (wanted SIMPLE_PINHOLE or PINHOLE, standing still: splats are "
+            "projected)",
+            (int)camera->model, camera_is_still(camera) ? "" : " with a rolling shutter");
     GBT_TRY(check_settings(settings, err));
     const double *p = camera->params;
     *out = (raster_view){.settings = *settings, .width = camera->width, .height = camera->height};

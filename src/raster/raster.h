@@ -49,7 +49,7 @@ typedef struct raster_scene {
     struct raster_state *state; /* internal */
 } raster_scene;
 
-/** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE. */
+/** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE, standing still. */
 bool raster_takes(const gbt_camera *camera);
 
 /**

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/camera_model.h"
+#include "base/camera_pose.h"
 #include "base/fail.h"
 #include "trace/ray_file.h"
 
@@ -112,7 +113,6 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     int direction;
     GBT_TRY(json_field_choice(r, "shutter", directions, 2, &direction));
     const json_t *end = json_object_get(r->object, "end");
-    shot->end = shot->camera;
     if (end == NULL)
         return json_field_given(r, "shutter")
                    ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)")
@@ -122,8 +122,15 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     const json_fields inner = {r->path, "end.", end, r->err};
     stand at = *start;
     GBT_TRY(json_field_names(&inner, " origin target up "));
-    shot->shutter = direction == 0 ? RAY_SHUTTER_ROWS : RAY_SHUTTER_COLUMNS;
-    return take_pose(&inner, false, origin, &at, &shot->end);
+    gbt_camera last = shot->camera;
+    GBT_TRY(take_pose(&inner, false, origin, &at, &last));
+    /* The two poses are those of the middles of the first and the last line. */
+    const int lines = direction == 0 ? last.height : last.width;
+    const double edge = lines > 1 ? 0.5 / (lines - 1) : 0;
+    camera_set_readout(&shot->camera, &last,
+                       direction == 0 ? GBT_CAMERA_SHUTTER_ROWS : GBT_CAMERA_SHUTTER_COLUMNS, -edge, 1 + edge,
+                       &shot->camera);
+    return GBT_OK;
 }
 
 static gbt_status take_aperture(const json_fields *r, ray_shot *shot)

@@ -66,7 +66,7 @@ static gbt_status take_camera(const json_fields *root, const json_t *common, siz
 
 static bool is_moving(const ray_shot *shot)
 {
-    return shot->shutter != RAY_SHUTTER_GLOBAL || shot->aperture_radius > 0;
+    return !camera_is_still(&shot->camera) || shot->aperture_radius > 0;
 }
 
 static gbt_status check_alike(const json_fields *root, const camera_path *path, bool same_lens)

@@ -41,9 +41,10 @@ typedef struct ray_job {
     uint64_t sample;
     camera_lens lens;
     bool pinhole;
-    const double *column_u; /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
-    double *lens_dir;       /* ray_lens.dir; other lenses only */
-    const pose *poses;      /* [1], or one for each row or column */
+    const double *column_u;     /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
+    double *lens_dir;           /* ray_lens.dir; other lenses only */
+    const pose *poses;          /* [1], or one for each row or column */
+    gbt_camera_shutter shutter; /* which; GBT_CAMERA_SHUTTER_GLOBAL also for a camera that does not move */
     aperture_cell cell;
     float *origin; /* NULL: one for all */
     float *dir;
@@ -149,9 +150,9 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
     const bool opens = shot->aperture_radius > 0;
     for (int i = 0; i < width; i++, origin += 3, dir += 3) {
         const size_t pixel = (size_t)row * (size_t)width + (size_t)i;
-        const pose *at = job->poses + (shot->shutter == RAY_SHUTTER_ROWS      ? row
-                                       : shot->shutter == RAY_SHUTTER_COLUMNS ? i
-                                                                              : 0);
+        const pose *at = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS      ? row
+                                       : job->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? i
+                                                                                    : 0);
         double start[3] = {0, 0, 0}, d[3] = {0, 0, 1};
         if (job->lens.kind == LENS_ORTHOGRAPHIC) {
             start[0] = job->column_u[i];
@@ -192,9 +193,9 @@ static void make_rows(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     for (size_t row = begin; row < end; row++) {
         const size_t at = 3 * row * (size_t)width;
-        const pose *stand = job->poses + (shot->shutter == RAY_SHUTTER_ROWS ? row : 0);
+        const pose *stand = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS ? row : 0);
         float *origin = job->origin == NULL ? NULL : job->origin + at, *dir = job->dir + at;
-        if (shot->aperture_radius > 0 || shot->shutter == RAY_SHUTTER_COLUMNS) {
+        if (shot->aperture_radius > 0 || job->shutter == GBT_CAMERA_SHUTTER_COLUMNS) {
             any_row(job, (int)row, origin, dir);
             continue;
         }
@@ -225,6 +226,9 @@ static bool pose_is_finite(const gbt_camera *camera)
     for (int i = 0; i < 3; i++)
         if (!isfinite((float)camera->center[i]))
             return false;
+    for (int i = 0; i < 6; i++)
+        if (!isfinite((float)camera->motion[i]))
+            return false;
     return true;
 }
 
@@ -236,8 +240,7 @@ static double origin_bound(const ray_shot *shot, const camera_lens *lens)
         camera_lens_origin(lens, i % 2 * shot->camera.width, i / 2 * shot->camera.height, corner);
         far = fmax(far, dvec_length(corner));
     }
-    return far + shot->aperture_radius +
-           fmax(dvec_length(shot->camera.center), dvec_length(shot->end.center));
+    return far + shot->aperture_radius + dvec_length(shot->camera.center) + dvec_length(shot->camera.motion);
 }
 
 static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error *err)
@@ -251,7 +254,7 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
                          "camera: model %d has unusable parameters (wanted a known model, finite values, "
                          "focal length > 0)",
                          (int)camera->model);
-    if (!pose_is_finite(camera) || !pose_is_finite(&shot->end))
+    if (!pose_is_finite(camera))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
     if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)",
@@ -323,24 +326,15 @@ static double *make_columns(const ray_job *job, gbt_error *err)
     return u;
 }
 
-static gbt_status make_poses(const ray_shot *shot, pose **out, gbt_error *err)
+static pose *make_poses(const gbt_camera *camera, gbt_camera_shutter shutter, gbt_error *err)
 {
-    const gbt_camera *camera = &shot->camera;
-    const bool still = shot->shutter == RAY_SHUTTER_GLOBAL;
-    const int count = still ? 1 : shot->shutter == RAY_SHUTTER_ROWS ? camera->height : camera->width;
-    camera_motion motion;
-    if (!still && !camera_motion_prepare(camera, &shot->end, &motion))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "camera: a rolling shutter wants two poses whose rotations are rotations");
+    const int count = shutter == GBT_CAMERA_SHUTTER_ROWS      ? camera->height
+                      : shutter == GBT_CAMERA_SHUTTER_COLUMNS ? camera->width
+                                                              : 1;
     pose *poses = mem_alloc((size_t)count, sizeof *poses, "poses", err);
-    if (poses == NULL)
-        return GBT_ERR_NO_MEMORY;
-    memcpy(poses[0].rotation, camera->rotation, sizeof poses[0].rotation);
-    memcpy(poses[0].center, camera->center, sizeof poses[0].center);
-    for (int i = 1; i < count; i++)
-        camera_motion_at(&motion, (double)i / (count - 1), poses[i].rotation, poses[i].center);
-    *out = poses;
-    return GBT_OK;
+    for (int i = 0; i < count && poses != NULL; i++)
+        camera_pose_during(camera, (i + 0.5) / count, poses[i].rotation, poses[i].center);
+    return poses;
 }
 
 /* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2
@@ -368,35 +362,26 @@ static gbt_status copy_given(const ray_image *given, ray_image *out, gbt_error *
     return GBT_OK;
 }
 
-/* A rolling shutter between two equal poses is none: all rays start at one point, which is quicker to
-   trace. */
-static bool stands_still(const ray_shot *shot)
+static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gbt_error *err)
 {
-    return memcmp(shot->camera.rotation, shot->end.rotation, sizeof shot->end.rotation) == 0 &&
-           memcmp(shot->camera.center, shot->end.center, sizeof shot->end.center) == 0;
-}
-
-static gbt_status make_rays(const ray_shot *given, int sample, ray_image *out, gbt_error *err)
-{
-    ray_shot still = *given;
-    still.shutter = RAY_SHUTTER_GLOBAL;
-    const ray_shot *shot = stands_still(given) ? &still : given;
     ray_job job = {.shot = shot, .sample = (uint64_t)sample};
-    GBT_TRY(check_shot(given, &job.lens, err));
+    if (!camera_is_still(&shot->camera))
+        job.shutter = shot->camera.shutter;
+    GBT_TRY(check_shot(shot, &job.lens, err));
     if (sample < 0 || sample >= ray_shot_sample_count(shot))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample,
                          ray_shot_sample_count(shot));
     job.cell = find_cell(sample, ray_shot_sample_count(shot));
     const bool flat = job.lens.kind == LENS_ORTHOGRAPHIC;
-    const bool common_origin = !flat && shot->shutter == RAY_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
+    const bool common_origin =
+        !flat && job.shutter == GBT_CAMERA_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
     job.pinhole = job.lens.kind == LENS_PERSPECTIVE && !job.lens.radial && !job.lens.extra;
     GBT_TRY(ray_image_reserve(out, shot->camera.width, shot->camera.height, common_origin, err));
     out->lens = job.lens;
     if (!flat && !job.pinhole)
         GBT_TRY(unproject_lens(&job, out, err));
-    pose *poses = NULL;
-    GBT_TRY(make_poses(shot, &poses, err));
-    double *column_u = make_columns(&job, err);
+    pose *poses = make_poses(&shot->camera, job.shutter, err);
+    double *column_u = poses == NULL ? NULL : make_columns(&job, err);
     if (column_u != NULL) {
         if (common_origin)
             round3(shot->camera.center, out->origin);

@@ -38,17 +38,9 @@ typedef struct ray_image {
     int next_lens; /* the one to be replaced */
 } ray_image;
 
-typedef enum ray_shutter {
-    RAY_SHUTTER_GLOBAL, /* all pixels at once */
-    RAY_SHUTTER_ROWS,   /* rows one after the other, from the top */
-    RAY_SHUTTER_COLUMNS /* columns one after the other, from the left */
-} ray_shutter;
-
 /** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
 typedef struct ray_shot {
-    gbt_camera camera;   /* lens, size, and the pose (of the first row or column, when the shutter rolls) */
-    ray_shutter shutter; /* default RAY_SHUTTER_GLOBAL */
-    gbt_camera end;      /* pose of the last row or column; the rest is not used */
+    gbt_camera camera;      /* lens, size, pose, and its motion while a rolling shutter reads it out */
     double aperture_radius; /* >= 0; 0, the default, is a pinhole */
     double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where
                                it is a sphere */
@@ -60,7 +52,7 @@ typedef struct ray_shot {
 
 static inline ray_shot ray_shot_of(const gbt_camera *camera)
 {
-    return (ray_shot){.camera = *camera, .end = *camera, .samples = 64};
+    return (ray_shot){.camera = *camera, .samples = 64};
 }
 
 /** Number of different ray images of a shot: its picture is their mean. */
@@ -77,8 +69,7 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  *
  * Everything is computed in double and rounded once. A pixel where the lens has no ray gets a zero direction.
  * Formulas: docs/cameras.md.
- * - Line i of n (row or column) of a rolling shutter is taken at the time i / (n - 1) of the way from
- * `camera` to `end`.
+ * - Line i of n (row or column) of a rolling shutter is taken (i + 0.5) / n of the readout after its start.
  * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn
  * evenly for (seed, s, pixel).
  *   It goes through the point that the ray through the middle of the aperture has in focus.

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/camera_sees.c -- into camera axes, onto the picture. */
+/* train/camera_sees.c -- points on the picture. */
 #include "train/camera_sees.h"
 
 #include <stddef.h>
@@ -8,11 +8,8 @@
 
 bool camera_pixel(const gbt_camera *camera, const float position[3], double pixel[2])
 {
-    double d[3], cam[3];
-    for (int k = 0; k < 3; k++)
-        d[k] = (double)position[k] - camera->center[k];
-    dmat_apply(camera->rotation, d, cam);
-    return gbt_camera_project(camera, cam, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
+    const double point[3] = {(double)position[0], (double)position[1], (double)position[2]};
+    return gbt_camera_pixel(camera, point, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
            pixel[0] < camera->width && pixel[1] < camera->height;
 }
 

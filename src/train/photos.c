@@ -321,11 +321,7 @@ static bool pick_camera(const gbt_camera *full, const photo_sample *sample, pick
                    .step = 1,
                    .width = width,
                    .height = height};
-    if (!gbt_camera_shifted(full, from->first[0], from->first[1], camera))
-        return false;
-    camera->width = width;
-    camera->height = height;
-    return true;
+    return gbt_camera_cropped(full, from->first[0], from->first[1], width, height, camera);
 }
 
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,

@@ -122,11 +122,10 @@ static void find_neighbors(seeding *s, double distance)
 
 static bool project(const gbt_camera *camera, const double world[3], double pixel[2])
 {
-    double d[3], cam[3];
+    double ahead = 0;
     for (int k = 0; k < 3; k++)
-        d[k] = world[k] - camera->center[k];
-    dmat_apply(camera->rotation, d, cam);
-    return cam[2] > 0 && gbt_camera_project(camera, cam, pixel);
+        ahead += camera->rotation[6 + k] * (world[k] - camera->center[k]);
+    return ahead > 0 && gbt_camera_pixel(camera, world, pixel);
 }
 
 /* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a
@@ -174,6 +173,7 @@ static void normalize_patch(float p[PATCH_AREA])
 typedef struct sweep {
     const seeding *s;
     const seed_view *view;
+    double start[3];  /* where the camera was when the pixel was taken */
     double ray[3][3]; /* world directions with depth 1 through the pixel, one pixel to the right, one down */
     float patch[PATCH_AREA];
 } sweep;
@@ -187,7 +187,7 @@ static float agreement_at(const sweep *w, double depth)
     double world[3][3];
     for (int p = 0; p < 3; p++)
         for (int k = 0; k < 3; k++)
-            world[p][k] = w->view->camera.center[k] + depth * w->ray[p][k];
+            world[p][k] = w->start[k] + depth * w->ray[p][k];
     for (size_t n = 0; n < w->view->neighbor_count; n++) {
         const seed_view *other = &w->s->views[w->view->neighbor[n]];
         double pixel[3][2], step[2][2];
@@ -223,12 +223,14 @@ static bool start_sweep(const seeding *s, const seed_view *v, double px, double 
     static const double step[3][2] = {{0, 0}, {1, 0}, {0, 1}};
     w->s = s;
     w->view = v;
+    const gbt_camera at = gbt_camera_at(&v->camera, px, py);
+    memcpy(w->start, at.center, sizeof w->start);
     for (int p = 0; p < 3; p++) {
         double dir[3];
         if (!gbt_camera_unproject(&v->camera, px + step[p][0], py + step[p][1], dir) || dir[2] < 0.1)
             return false;
         const double plane[3] = {dir[0] / dir[2], dir[1] / dir[2], 1};
-        dmat_apply_transposed(v->camera.rotation, plane, w->ray[p]);
+        dmat_apply_transposed(at.rotation, plane, w->ray[p]);
     }
     if (!read_patch(v, (double[2]){px, py}, step[1], step[2], w->patch))
         return false;
@@ -265,7 +267,7 @@ static void find_depth(const sweep *w, candidate *c)
     }
     const double depth = depth_of(w->s, index);
     for (int k = 0; k < 3; k++)
-        c->position[k] = (float)(w->view->camera.center[k] + depth * w->ray[0][k]);
+        c->position[k] = (float)(w->start[k] + depth * w->ray[0][k]);
     c->doubt = 1 - score[best] + (rival > score[best] - lead ? 1.0f : 0.0f);
 }
 

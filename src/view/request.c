@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/camera_pose.h"
 #include "base/choice.h"
 #include "base/fail.h"
 #include "data/number.h"
@@ -78,7 +79,7 @@ static gbt_status take_camera(const words *w, request *out)
         return base_fail(w->err, GBT_ERR_ARGUMENT, "width: the camera says its own");
     ray_shot shot;
     GBT_TRY(camera_text_read(text, "camera", none, &shot, w->err));
-    if (shot.aperture_radius > 0 || shot.shutter != RAY_SHUTTER_GLOBAL)
+    if (shot.aperture_radius > 0 || !camera_is_still(&shot.camera))
         return base_fail(w->err, GBT_ERR_ARGUMENT,
                          "camera: an open aperture or a rolling shutter is for gbtrace render");
     out->camera = shot.camera;

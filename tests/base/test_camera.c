@@ -588,6 +588,102 @@ static void shifting_keeps_rays(void **state)
     }
 }
 
+static gbt_camera rolling_camera(gbt_camera_shutter shutter)
+{
+    static const double motion[6] = {0.3, -0.2, 0.1, 0.2, 0.3, -0.1}, turn[4] = {0.8, 0.36, -0.48, 0};
+    gbt_camera camera =
+        camera_of(GBT_CAMERA_PINHOLE, (const double[GBT_CAMERA_MAX_PARAMS]){400, 410, 320, 240});
+    dquat_to_matrix(turn, camera.rotation);
+    camera.center[1] = 5;
+    camera.shutter = shutter;
+    memcpy(camera.motion, motion, sizeof motion);
+    return camera;
+}
+
+/* A line of the image is what the camera sees after its part of the motion. */
+static void rolling_by_lines(void **state)
+{
+    (void)state;
+    for (int by_columns = 0; by_columns < 2; by_columns++) {
+        const gbt_camera camera =
+            rolling_camera(by_columns ? GBT_CAMERA_SHUTTER_COLUMNS : GBT_CAMERA_SHUTTER_ROWS);
+        for (int line = 0; line <= 8; line++) {
+            const double x = by_columns ? line * WIDTH / 8.0 : 100, y = by_columns ? 50 : line * HEIGHT / 8.0;
+            double part[6], start[3], dir[3], wanted_start[3], wanted_dir[3], way[3];
+            for (int k = 0; k < 6; k++)
+                part[k] = (line / 8.0 - 0.5) * camera.motion[k];
+            gbt_camera there = gbt_camera_moved(&camera, part);
+            const gbt_camera at = gbt_camera_at(&camera, x, y);
+            there.shutter = GBT_CAMERA_SHUTTER_GLOBAL;
+            assert_true(gbt_camera_ray(&there, x, y, wanted_start, wanted_dir));
+            assert_true(gbt_camera_ray(&camera, x, y, start, dir));
+            dmat_apply_transposed(camera.rotation, part, way);
+            for (int k = 0; k < 3; k++) {
+                assert_near(start[k], wanted_start[k], 1e-15);
+                assert_near(start[k], camera.center[k] + way[k], 1e-15);
+                assert_near(dir[k], wanted_dir[k], 1e-15);
+                assert_near(at.center[k], start[k], 0);
+                assert_near(at.motion[k], 0, 0);
+            }
+        }
+    }
+}
+
+/* Parts of an image are taken in their part of the time: the same rays. */
+static void parts_of_a_rolling_image(void **state)
+{
+    (void)state;
+    for (gbt_camera_shutter s = GBT_CAMERA_SHUTTER_GLOBAL; s <= GBT_CAMERA_SHUTTER_COLUMNS; s++) {
+        const gbt_camera camera = rolling_camera(s);
+        gbt_camera some[4];
+        assert_true(gbt_camera_every(&camera, 3, 1, 2, &some[0]));
+        assert_true(gbt_camera_shifted(&camera, 0.25, -0.375, &some[1]));
+        assert_true(gbt_camera_cropped(&camera, 200, 120, 64, 48, &some[2]));
+        some[3] = gbt_camera_resized(&camera, WIDTH / 4, HEIGHT / 4);
+        assert_int_equal(some[2].width, 64);
+        assert_int_equal(some[2].height, 48);
+        for (int i = 0; i < 4; i++)
+            for (int k = 0; k < 20; k++) {
+                const double x = 0.5 + k * some[i].width / 20, y = 0.5 + (19 - k) * some[i].height / 20;
+                const double there[4][2] = {
+                    {3 * x, 3 * y + 1}, {x + 0.25, y - 0.375}, {x + 200, y + 120}, {4 * x, 4 * y}};
+                double start[3], dir[3], other_start[3], other_dir[3];
+                assert_true(gbt_camera_ray(&some[i], x, y, start, dir));
+                assert_true(gbt_camera_ray(&camera, there[i][0], there[i][1], other_start, other_dir));
+                for (int axis = 0; axis < 3; axis++) {
+                    assert_near(start[axis], other_start[axis], 1e-13);
+                    assert_near(dir[axis], other_dir[axis], 1e-13);
+                }
+            }
+    }
+}
+
+/* gbt_camera_pixel() inverts gbt_camera_ray(), moving or not. */
+static void pixels_of_points(void **state)
+{
+    (void)state;
+    for (gbt_camera_shutter s = GBT_CAMERA_SHUTTER_GLOBAL; s <= GBT_CAMERA_SHUTTER_COLUMNS; s++) {
+        const gbt_camera camera = rolling_camera(s);
+        for (int k = 0; k < 100; k++) {
+            const double x = 6.4 * k, y = 4.8 * (k * 37 % 100);
+            double start[3], dir[3], point[3], behind[3], pixel[2];
+            assert_true(gbt_camera_ray(&camera, x, y, start, dir));
+            for (int axis = 0; axis < 3; axis++) {
+                point[axis] = start[axis] + 3 * dir[axis];
+                behind[axis] = start[axis] - 3 * dir[axis];
+            }
+            assert_true(gbt_camera_pixel(&camera, point, pixel));
+            assert_near(pixel[0], x, 1e-7);
+            assert_near(pixel[1], y, 1e-7);
+            assert_false(gbt_camera_pixel(&camera, behind, pixel));
+        }
+    }
+    gbt_camera none = rolling_camera(GBT_CAMERA_SHUTTER_ROWS);
+    double pixel[2];
+    none.params[0] = 0;
+    assert_false(gbt_camera_pixel(&none, (const double[3]){0, 5, 3}, pixel));
+}
+
 static void resizing_exact_numbers(void **state)
 {
     (void)state;
@@ -758,6 +854,9 @@ int main(void)
         cmocka_unit_test(resizing_keeps_rays),
         cmocka_unit_test(every_step_keeps_rays),
         cmocka_unit_test(shifting_keeps_rays),
+        cmocka_unit_test(rolling_by_lines),
+        cmocka_unit_test(parts_of_a_rolling_image),
+        cmocka_unit_test(pixels_of_points),
         cmocka_unit_test(resizing_exact_numbers),
         cmocka_unit_test(half_fov),
         cmocka_unit_test(orthographic),

@@ -500,8 +500,8 @@ static void what_cannot_be_drawn(void **state)
     assert_non_null(strstr(err.text, "aperture"));
     memset(&err, 0, sizeof err);
     shot = ray_shot_of(&camera);
-    shot.shutter = RAY_SHUTTER_ROWS;
-    shot.end.center[0] += 1;
+    shot.camera.shutter = GBT_CAMERA_SHUTTER_ROWS;
+    shot.camera.motion[0] = 1;
     assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err),
                      GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "rolling shutter"));

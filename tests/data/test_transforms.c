@@ -3,6 +3,7 @@
 #include "data_support.h"
 
 #include "base/vec.h"
+#include "base/near.h"
 #include "data/transforms.h"
 
 /* The photos of the cases: a.png of 8 x 6 pixels, and sub/b.jpg. One folder for all, made by main(): a
@@ -21,6 +22,9 @@ static gbt_status read_json(const char *text, size_t size, raw_scene *raw, char 
 #define POSE "\"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]]"
 #define FRAME "{\"file_path\": \"a.png\", " POSE "}"
 #define FRAMES "\"frames\": [" FRAME "]}"
+#define ROLLING(times)                                                                                       \
+    "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"rolling_shutter\": " times ", \"frames\": [{\"file_path\": "       \
+    "\"a.png\", \"transform_matrix_start\": [[1,0,0,1],[0,1,0,2],[0,0,1,3]]}]}"
 #define SIZED "{\"w\": 8, \"h\": 6, \"fl_x\": 10, "
 
 typedef struct json_case {
@@ -135,6 +139,16 @@ static json_case json_cases[] = {
      "none of the 1 photos exists, the first is c"},
     {"55 a folder is no photo", SIZED "\"frames\": [{\"file_path\": \"sub\", " POSE "}]}", GBT_ERR_IO,
      "none of the 1 photos exists"},
+    {"only an end", SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix_end\": [[1]]}]}", BAD,
+     "frame 0: transform_matrix: is missing"},
+    {"an end that is none",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", " POSE ", \"transform_matrix_end\": 3}]}", BAD,
+     "frame 0: transform_matrix_end: wanted 3 or 4 rows"},
+    {"a shutter of three", ROLLING("[0, 0, 1]"), BAD, "frame 0: rolling_shutter: wanted 4 numbers"},
+    {"a shutter of words", ROLLING("[0, 0, \"1\", 0]"), BAD, "rolling_shutter: holds something that is not"},
+    {"a slow shutter", ROLLING("[0, 0, 1.5, 0]"), BAD, "not a number in -1..1"},
+    {"a shutter both ways", ROLLING("[0, 1, 1, 0]"), BAD, "rolling_shutter: goes across and down"},
+    {"a shutter", ROLLING("[0, 0, 1, 0]"), GBT_OK, NULL},
     {"unknown camera model", "{\"camera_model\": \"FISHEYE624\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES,
      BAD, "camera_model is not supported: FISHEYE624"},
     {"camera model a number", "{\"camera_model\": 4, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
@@ -307,6 +321,62 @@ static void turned_axes(void **state)
     raw_free(&raw);
 }
 
+/* A camera that goes from (1, 2, 3) to (5, 2, 3) and turns a right angle about z while its rows are read: the
+   pose is that of the middle, and every line has its own. */
+static void rolling_shutters(void **state)
+{
+    (void)state;
+#define WAY                                                                                                  \
+    "\"transform_matrix_start\": [[1,0,0,1],[0,1,0,2],[0,0,1,3]], \"transform_matrix_end\": "                \
+    "[[0,-1,0,5],[1,0,0,2],[0,0,1,3]]"
+    static const struct {
+        const char *shutter;
+        gbt_camera_shutter kind;
+        double first, last; /* share of the way at the edges of the picture */
+    } rows[] = {{"[0, 0, 1, 0]", GBT_CAMERA_SHUTTER_ROWS, 0, 1},
+                {"[1, 0, -1, 0]", GBT_CAMERA_SHUTTER_ROWS, 1, 0},
+                {"[0.25, 0.5, 0, 0]", GBT_CAMERA_SHUTTER_COLUMNS, 0.25, 0.75},
+                {"[0, 0, 0.5, 0.5]", GBT_CAMERA_SHUTTER_ROWS, 0.25, 0.75},
+                {"[0.5, 0, 0, 0]", GBT_CAMERA_SHUTTER_ROWS, 0.5, 0.5}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        for (int in_frame = 0; in_frame < 2; in_frame++) {
+            char text[1024];
+            snprintf(text, sizeof text,
+                     SIZED "\"%s\": %s, \"frames\": [{\"file_path\": \"a.png\", %s%s%s " WAY "}]}",
+                     in_frame ? "unknown" : "rolling_shutter", rows[i].shutter,
+                     in_frame ? "\"rolling_shutter\": " : "", in_frame ? rows[i].shutter : "",
+                     in_frame ? "," : "");
+            raw_scene raw = {0};
+            char *points_name = NULL;
+            must(read_json(text, strlen(text), &raw, &points_name, &err));
+            const gbt_camera *camera = &raw.views[0].camera;
+            assert_int_equal(camera->shutter, rows[i].kind);
+            for (int k = 0; k <= 4; k++) {
+                const double share = rows[i].first + (rows[i].last - rows[i].first) * k / 4,
+                             angle = 1.5707963267948966 * share;
+                const gbt_camera at =
+                    gbt_camera_at(camera, camera->width * k / 4.0, camera->height * k / 4.0);
+                assert_near(at.center[0], 1 + 4 * share, 1e-12);
+                assert_near(at.center[1], 2, 1e-12);
+                assert_near(at.rotation[0], cos(angle), 1e-12); /* the camera's right in the world */
+                assert_near(at.rotation[1], sin(angle), 1e-12);
+            }
+            raw_free(&raw);
+        }
+    /* Without times it is the first pose; with one matrix there is no way. */
+    static const char *const still[] = {SIZED "\"frames\": [{\"file_path\": \"a.png\", " WAY "}]}",
+                                        SIZED "\"rolling_shutter\": [0, 0, 1, 0], " FRAMES};
+    for (int i = 0; i < 2; i++) {
+        raw_scene raw = {0};
+        char *points_name = NULL;
+        must(read_json(still[i], strlen(still[i]), &raw, &points_name, &err));
+        const gbt_camera at = gbt_camera_at(&raw.views[0].camera, 0, 6);
+        assert_near(at.center[0], 1, 1e-15);
+        assert_near(at.rotation[0], 1, 1e-15);
+        raw_free(&raw);
+    }
+}
+
 static void missing_frames_are_counted(void **state)
 {
     (void)state;
@@ -365,7 +435,7 @@ int main(void)
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(axes),         cmocka_unit_test(turned_axes),
         cmocka_unit_test(deep_nesting), cmocka_unit_test(missing_frames_are_counted),
-        cmocka_unit_test(mutations),
+        cmocka_unit_test(mutations),    cmocka_unit_test(rolling_shutters),
     };
     void *folder = NULL;
     if (make_temporary(&folder) != 0)

@@ -2,6 +2,7 @@
 /* tests/frame/test_frame.c -- frames of any shot: nothing that a ray reaches is left out, samples are
    averaged in order, same bits for all threads. */
 #include "anchor/fixture.h"
+#include "base/camera_pose.h"
 #include "base/near.h"
 #include "base/parallel.h"
 #include "base/vec.h"
@@ -52,11 +53,14 @@ static ray_shot random_shot(uint64_t seed, int kind, ray_image *given)
         shot.focus_distance = uniform(seed, 4, 0.5, 6);
     }
     if (kind == 4 || kind == 6) {
-        shot.shutter = seed % 2 == 0 ? RAY_SHUTTER_ROWS : RAY_SHUTTER_COLUMNS;
+        gbt_camera end = shot.camera;
         if (kind == 4)
-            random_pose(seed, 9, 3, &shot.end);
+            random_pose(seed, 9, 3, &end);
         else
-            shot.end.center[0] += 0.3;
+            end.center[0] += 0.3;
+        assert_true(camera_set_readout(&shot.camera, &end,
+                                       seed % 2 == 0 ? GBT_CAMERA_SHUTTER_ROWS : GBT_CAMERA_SHUTTER_COLUMNS,
+                                       0, 1, &shot.camera));
     }
     if (kind == 8) {
         assert_ok(ray_image_reserve(given, W, H, false, NULL));

@@ -24,16 +24,23 @@ typedef struct camera_case {
     const char *name;
     gbt_camera_model model;
     double params[8], back; /* back: distance from the middle of the scene */
+    gbt_camera_shutter shutter;
 } camera_case;
 
 static const camera_case cameras[] = {
-    {"PINHOLE", GBT_CAMERA_PINHOLE, {20, 21, 11, 7}, 4},
-    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.6}, /* at 0.5 a cut lies within the step of
-                                                                        the differences */
-    {"OPENCV", GBT_CAMERA_OPENCV, {18, 18, 11, 7.5, -0.12, 0.03, 0.01, -0.02}, 4},
-    {"OPENCV_FISHEYE", GBT_CAMERA_OPENCV_FISHEYE, {9, 9, 11, 7.5, 0.02, -0.01, 0.003, 0}, 2},
-    {"EQUIRECTANGULAR", GBT_CAMERA_EQUIRECTANGULAR, {W, H}, 1},
-    {"ORTHOGRAPHIC", GBT_CAMERA_ORTHOGRAPHIC, {6, 6, 9, 8}, 3},
+    {"PINHOLE", GBT_CAMERA_PINHOLE, {20, 21, 11, 7}, 4, GBT_CAMERA_SHUTTER_GLOBAL},
+    {"PINHOLE, inside", GBT_CAMERA_PINHOLE, {14, 14, 11.5, 7}, 0.6, GBT_CAMERA_SHUTTER_GLOBAL}, /* at 0.5 a
+                                                                        cut lies within the step of the
+                                                                        differences */
+    {"OPENCV", GBT_CAMERA_OPENCV, {18, 18, 11, 7.5, -0.12, 0.03, 0.01, -0.02}, 4, GBT_CAMERA_SHUTTER_GLOBAL},
+    {"OPENCV_FISHEYE",
+     GBT_CAMERA_OPENCV_FISHEYE,
+     {9, 9, 11, 7.5, 0.02, -0.01, 0.003, 0},
+     2,
+     GBT_CAMERA_SHUTTER_GLOBAL},
+    {"EQUIRECTANGULAR", GBT_CAMERA_EQUIRECTANGULAR, {W, H}, 1, GBT_CAMERA_SHUTTER_GLOBAL},
+    {"ORTHOGRAPHIC", GBT_CAMERA_ORTHOGRAPHIC, {6, 6, 9, 8}, 3, GBT_CAMERA_SHUTTER_GLOBAL},
+    {"PINHOLE, rolling shutter", GBT_CAMERA_PINHOLE, {20, 21, 11, 7}, 4, GBT_CAMERA_SHUTTER_ROWS},
 };
 enum { CAMERAS = sizeof cameras / sizeof *cameras, CASES = CAMERAS * 4 };
 
@@ -41,7 +48,11 @@ enum { CAMERAS = sizeof cameras / sizeof *cameras, CASES = CAMERAS * 4 };
    to such. */
 static gbt_camera camera_of(const camera_case *c, const double at[3])
 {
-    gbt_camera camera = {.model = c->model, .width = W, .height = H};
+    gbt_camera camera = {.model = c->model,
+                         .width = W,
+                         .height = H,
+                         .shutter = c->shutter,
+                         .motion = {0.4, -0.3, 0.2, 0.1, -0.2, 0.15}};
     const double q[4] = {0.8, 0.36, -0.48, 0}; /* of length 1 */
     memcpy(camera.params, c->params, sizeof c->params);
     dquat_to_matrix(q, camera.rotation);

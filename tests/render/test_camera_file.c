@@ -64,7 +64,8 @@ static void a_plain_pinhole(void **state)
     assert_near(c->center[0], 0.5, 0);
     assert_near(c->center[1], 0, 0);
     assert_near(c->center[2], 4, 0);
-    assert_true(f.shot.shutter == RAY_SHUTTER_GLOBAL && f.shot.given == NULL && f.shot.aperture_radius == 0);
+    assert_true(f.shot.camera.shutter == GBT_CAMERA_SHUTTER_GLOBAL && f.shot.given == NULL &&
+                f.shot.aperture_radius == 0);
     assert_int_equal(ray_shot_sample_count(&f.shot), 1);
 }
 
@@ -85,6 +86,12 @@ static void models(void **state)
     assert_near(f.shot.camera.params[1], 64 / 6.283185307179586, 1e-13);
 }
 
+/* When the middle of the last row and column is taken. */
+static gbt_camera last_line(const gbt_camera *camera)
+{
+    return gbt_camera_at(camera, camera->width - 0.5, camera->height - 0.5);
+}
+
 static void aperture_and_shutter(void **state)
 {
     (void)state;
@@ -101,15 +108,17 @@ static void aperture_and_shutter(void **state)
     /* What the end does not say is as at the start. */
     const double shift[3] = {1, 1, 1};
     f = read_good("{" POSE ", \"fov_x_deg\": 90, \"end\": {\"origin\": [1, 2, 5]}}", shift);
-    assert_int_equal(f.shot.shutter, RAY_SHUTTER_ROWS);
-    assert_near(f.shot.end.center[2], 4, 0);
-    assert_near(f.shot.end.center[0], 0, 0);
-    assert_near(f.shot.end.rotation[8], 1, 1e-15);
+    assert_int_equal(f.shot.camera.shutter, GBT_CAMERA_SHUTTER_ROWS);
+    gbt_camera last = last_line(&f.shot.camera);
+    assert_near(last.center[2], 4, 1e-15);
+    assert_near(last.center[0], 0, 1e-15);
+    assert_near(last.rotation[8], 1, 1e-15);
     f = read_good("{" POSE ", \"fov_x_deg\": 90, \"shutter\": \"columns\", \"end\": {\"up\": [1, 0, 0]}}",
                   none);
-    assert_int_equal(f.shot.shutter, RAY_SHUTTER_COLUMNS);
-    assert_near(f.shot.end.rotation[1], 1, 1e-15); /* right is now +y */
-    assert_near(f.shot.end.center[2], 3, 0);
+    assert_int_equal(f.shot.camera.shutter, GBT_CAMERA_SHUTTER_COLUMNS);
+    last = last_line(&f.shot.camera);
+    assert_near(last.rotation[1], 1, 1e-15); /* right is now +y */
+    assert_near(last.center[2], 3, 0);
 }
 
 static void rays_beside_it(void **state)

@@ -372,8 +372,54 @@ static void lenses_that_see_far_around(void **state)
         free_written(&w);
     }
     gbt_make_scene_def def = small_def("courtyard");
-    def.lens = (gbt_make_scene_lens)9;
+    def.lens = (gbt_make_scene_lens)99;
     assert_int_equal(gbt_make_scene(&def, under_root("no lens"), NULL), GBT_ERR_ARGUMENT);
+}
+
+/* What a moving camera sees of a point is where its rays say: the exact depth there ends at the point. */
+static void rolling_cameras_are_true(void **state)
+{
+    (void)state;
+    gbt_make_scene_def def = small_def("courtyard");
+    def.lens = GBT_MAKE_SCENE_ROLLING;
+    def.samples = 1;
+    def.point_noise = 0;
+    const char *folder = under_root("rolling");
+    assert_ok(gbt_make_scene(&def, folder, NULL));
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    scene s;
+    assert_ok(scene_load(folder, &split, &s, NULL));
+    assert_int_equal(s.view_count, def.view_count);
+    assert_int_equal(s.points.count, def.points);
+    size_t seen = 0, moved = 0;
+    for (size_t v = 0; v < s.view_count; v++) {
+        char path[512];
+        image depth;
+        const gbt_camera *camera = &s.views[v].camera;
+        gbt_camera still = *camera;
+        still.shutter = GBT_CAMERA_SHUTTER_GLOBAL;
+        assert_int_equal(camera->shutter, GBT_CAMERA_SHUTTER_ROWS);
+        snprintf(path, sizeof path, "%s/depth/%04zu.exr", folder, v);
+        assert_ok(image_read(path, &depth, NULL));
+        for (size_t p = 0; p < s.points.count; p++) {
+            double point[3], pixel[2], other[2];
+            for (size_t k = 0; k < 3; k++)
+                point[k] = (double)s.points.position[3 * p + k];
+            if (!gbt_camera_pixel(camera, point, pixel) || pixel[0] < 0 || pixel[1] < 0 || pixel[0] >= 96 ||
+                pixel[1] >= 72)
+                continue;
+            const gbt_camera at = gbt_camera_at(camera, pixel[0], pixel[1]);
+            const double to[3] = {point[0] - at.center[0], point[1] - at.center[1], point[2] - at.center[2]},
+                         there = (double)depth.pixels[(size_t)pixel[1] * 96 + (size_t)pixel[0]];
+            seen += fabs(there - dvec_length(to)) < 0.02 * dvec_length(to);
+            moved += gbt_camera_pixel(&still, point, other) &&
+                     dvec_length2(other[0] - pixel[0], other[1] - pixel[1]) > 0.5;
+        }
+        image_free(&depth);
+    }
+    assert_true(seen > 3 * s.points.count * 9 / 10); /* three views each, but for a few at edges */
+    assert_true(moved > seen / 4);
+    scene_free(&s);
 }
 
 /* Without noise a point is on the surface: the exact depth along its first ray ends at it. With noise it is
@@ -619,6 +665,7 @@ int main(void)
         cmocka_unit_test(distorted_cameras_are_true),
         cmocka_unit_test(gaussians_lie_on_surfaces),
         cmocka_unit_test(lenses_that_see_far_around),
+        cmocka_unit_test(rolling_cameras_are_true),
         cmocka_unit_test(noise_is_what_was_asked),
         cmocka_unit_test(same_seed_same_bytes),
         cmocka_unit_test(missing_arguments_are_refused),

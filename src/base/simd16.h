@@ -63,6 +63,16 @@ static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
 }
 #endif
 
+#ifndef VMASK16_PACK
+static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *out)
+{
+    unsigned count = 0;
+    for (unsigned bits = vmask16_bits(m); bits != 0; bits &= bits - 1)
+        out[count++] = from[__builtin_ctz(bits)];
+    return count;
+}
+#endif
+
 /* As fmaxf() and fminf() of numbers, but not calls. */
 static inline float larger(float a, float b) { return a > b ? a : b; }
 static inline float smaller(float a, float b) { return a < b ? a : b; }

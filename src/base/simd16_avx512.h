@@ -83,6 +83,15 @@ static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
     return (unsigned)__builtin_popcount(m);
 }
 
+/* The values of every lane that is true, in order; up to sixteen places of `out` are written. Returned: how
+   many are true. */
+#define VMASK16_PACK
+static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *out)
+{
+    _mm512_storeu_si512(out, _mm512_maskz_compress_epi32(m, _mm512_loadu_si512(from)));
+    return (unsigned)__builtin_popcount(m);
+}
+
 /* Rows k, k + 4, k + 8, k + 12 of each of four vectors, so that the last step leaves them in order. */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \

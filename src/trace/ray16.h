@@ -10,7 +10,7 @@
 #include "trace/kernel.h"
 #include "trace/ray_hits.h"
 
-enum { RAY_ROUND = 48 };
+enum { RAY_ROUND = 80 };
 
 typedef struct ray_state {
     float transmittance, rgb[3];
@@ -218,6 +218,17 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     return true;
 }
 
+/* Gaussians of a leaf whose ellipsoids the ray meets join those that wait. Few of a leaf do: those of several
+   leaves are evaluated together. */
+static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
+                       const tree_leaf *leaf, kernel_scratch *scratch, kernel_counters *counters)
+{
+    counters->nodes++;
+    const vmask16 met = vmask16_from_bits(walk_leaf(walk, leaf) & (0xFFFFu >> (TREE_WIDTH - leaf->count)));
+    r->waiting_count += (int)vmask16_pack(met, leaf->id, r->waiting + r->waiting_count);
+    return r->waiting_count < TREE_WIDTH || hit_waiting(r, scene, ray, TREE_WIDTH, scratch, counters);
+}
+
 static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
                        unsigned packet, int lane, hit_tape *tape, kernel_scratch *scratch,
                        kernel_counters *counters)
@@ -226,27 +237,26 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *
     size_t round = RAY_ROUND;
     for (uint64_t child = (uint64_t)(uintptr_t)scene->root;;) {
         const tree_leaf *leaf = tree_child_leaf(child);
-        counters->nodes++;
         if (leaf != NULL) {
-            for (unsigned bits = walk_leaf(walk, leaf) & (0xFFFFu >> (TREE_WIDTH - leaf->count)); bits != 0;
-                 bits &= bits - 1) {
-                const uint32_t id = leaf->id[__builtin_ctz(bits)];
-                __builtin_prefetch(scene->records + (size_t)id * RECORD_FLOATS);
-                r->waiting[r->waiting_count++] = id;
-            }
-            /* Few Gaussians of a leaf lie on the ray: those of several leaves are evaluated together. */
-            if (r->waiting_count >= TREE_WIDTH && !hit_waiting(r, scene, ray, TREE_WIDTH, scratch, counters))
+            if (!visit_leaf(r, scene, walk, ray, leaf, scratch, counters))
                 return false;
         } else {
             const tree_node *node = (const tree_node *)(uintptr_t)child;
             _Alignas(64) float entry[TREE_WIDTH];
+            counters->nodes++;
             if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count,
                             (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap, "nodes of a ray",
                             NULL) != GBT_OK)
                 return false;
-            for (unsigned bits = walk_children(walk, node, entry); bits != 0; bits &= bits - 1)
-                heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)],
-                          node->child[__builtin_ctz(bits)]);
+            for (unsigned bits = walk_children(walk, node, entry); bits != 0; bits &= bits - 1) {
+                const uint64_t next = node->child[__builtin_ctz(bits)];
+                leaf = tree_child_leaf(next);
+                if (leaf != NULL) {
+                    if (!visit_leaf(r, scene, walk, ray, leaf, scratch, counters))
+                        return false;
+                } else
+                    heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], next);
+            }
         }
         if (r->count >= round || heap_count == 0) {
             if (r->waiting_count > 0 && !hit_waiting(r, scene, ray, r->waiting_count, scratch, counters))

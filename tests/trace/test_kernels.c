@@ -9,6 +9,7 @@
 #include "test_support.h"
 #include "trace/fixture.h"
 #include "reference_once.h"
+#include "trace/ray_hits.h"
 #include "trace/rows16.h"
 #include "trace/trace.h"
 
@@ -468,12 +469,39 @@ static void rows_are_in_exact_order(void **state)
     }
 }
 
+static int by_key(const void *a, const void *b)
+{
+    const uint64_t x = ((const ray_hit *)a)->key, y = ((const ray_hit *)b)->key;
+    return (x > y) - (x < y);
+}
+
+/* Any number of hits, with depths of which few or many are equal; depths may be infinite. */
+static void hits_are_sorted(void **state)
+{
+    (void)state;
+    enum { MOST = 700 };
+    static ray_hit hits[MOST], spare[MOST], wanted[MOST];
+    for (size_t n = 0; n <= MOST; n += n < 220 ? 1 : 37)
+        for (int kind = 0; kind < 3; kind++) {
+            for (size_t i = 0; i < n; i++) {
+                const float u = rng_uniform(n, (uint64_t)kind, i);
+                const float depth = kind == 0 ? 1 + u : kind == 1 ? floorf(4 * u) : u < 0.5f ? INFINITY : 7;
+                wanted[i] = hits[i] = make_hit(depth, 0.5f + (float)i, (uint32_t)(i * 2654435761u));
+            }
+            sort_hits(hits, spare, n);
+            qsort(wanted, n, sizeof *wanted, by_key);
+            for (size_t i = 0; i < n; i++)
+                assert_true(hits[i].key == wanted[i].key && hits[i].alpha == wanted[i].alpha);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_kernels_all_outputs), cmocka_unit_test(kernels_share_the_adjoint),
         cmocka_unit_test(surfaces_and_radius),     cmocka_unit_test(parts_of_rays),
-        cmocka_unit_test(no_room_for_the_tape),    cmocka_unit_test(rows_are_in_exact_order),
+        cmocka_unit_test(hits_are_sorted),         cmocka_unit_test(no_room_for_the_tape),
+        cmocka_unit_test(rows_are_in_exact_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/camera_pose.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/file.h"
@@ -46,7 +47,7 @@ static gbt_status find_box(const float *position, size_t count, const double ori
 typedef struct dataset_facts {
     const scene *s;
     photo_check photos;
-    size_t views_by_model[GBT_CAMERA_MODEL_COUNT], test_views;
+    size_t views_by_model[GBT_CAMERA_MODEL_COUNT], rolling_views, test_views;
     double low[3], high[3], extent;
     expectation expect;
 } dataset_facts;
@@ -68,22 +69,22 @@ static json_t *dataset_to_json(const char *path, const dataset_facts *f)
     json_t *problems = json_array();
     for (size_t i = 0; i < f->photos.problem_count && i < PHOTO_CHECK_SHOWN; i++)
         json_array_append_new(problems, json_text(f->photos.problem[i]));
-    return json_pack("{s:i,s:s,s:o,s:s,s:I,s:o,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i],s:o},s:"
-                     "I,s:I,s:s,s:I,s:b,s:I,s:[f,f,"
-                     "f],s:o,s:f,s:o}",
-                     "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views",
-                     (json_int_t)s->view_count, "cameras", cameras, "photos", "found",
-                     (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing, "unreadable",
-                     (json_int_t)f->photos.unreadable, "other_shape", (json_int_t)f->photos.other_shape,
-                     "other_size", (json_int_t)f->photos.other_size, "tiny", (json_int_t)f->photos.tiny,
-                     "turned", (json_int_t)f->photos.turned, "with_alpha", (json_int_t)f->photos.with_alpha,
-                     "with_mask", (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width,
-                     f->photos.min_height, "max_size", f->photos.max_width, f->photos.max_height, "problems",
-                     problems, "train_views", (json_int_t)(s->view_count - f->test_views), "test_views",
-                     (json_int_t)f->test_views, "split", split_name(s), "points", (json_int_t)s->points.count,
-                     "points_have_color", (int)s->points.has_color, "points_dropped",
-                     (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2],
-                     "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
+    return json_pack(
+        "{s:i,s:s,s:o,s:s,s:I,s:o,s:I,s:{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:[i,i],s:[i,i],s:o},s:"
+        "I,s:I,s:s,s:I,s:b,s:I,s:[f,f,"
+        "f],s:o,s:f,s:o}",
+        "schema", 1, "kind", "dataset", "path", json_text(path), "source", s->source, "views",
+        (json_int_t)s->view_count, "cameras", cameras, "rolling", (json_int_t)f->rolling_views, "photos",
+        "found", (json_int_t)f->photos.found, "missing", (json_int_t)s->photos_missing, "unreadable",
+        (json_int_t)f->photos.unreadable, "other_shape", (json_int_t)f->photos.other_shape, "other_size",
+        (json_int_t)f->photos.other_size, "tiny", (json_int_t)f->photos.tiny, "turned",
+        (json_int_t)f->photos.turned, "with_alpha", (json_int_t)f->photos.with_alpha, "with_mask",
+        (json_int_t)f->photos.with_mask, "min_size", f->photos.min_width, f->photos.min_height, "max_size",
+        f->photos.max_width, f->photos.max_height, "problems", problems, "train_views",
+        (json_int_t)(s->view_count - f->test_views), "test_views", (json_int_t)f->test_views, "split",
+        split_name(s), "points", (json_int_t)s->points.count, "points_have_color", (int)s->points.has_color,
+        "points_dropped", (json_int_t)s->points_dropped, "origin", s->origin[0], s->origin[1], s->origin[2],
+        "point_box", box, "camera_extent", f->extent, "expect", expect_to_json(&f->expect));
 }
 
 static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
@@ -102,6 +103,8 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
                         f->views_by_model[m]);
                 separator = ", ";
             }
+        if (f->rolling_views > 0)
+            fprintf(out, ", %zu with a rolling shutter", f->rolling_views);
         fprintf(out, "\n  photos    %zu found, %zu unreadable", p->found, p->unreadable);
         if (s->photos_missing > 0)
             fprintf(out, ", %zu missing", s->photos_missing);
@@ -145,6 +148,7 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
     photo_check_all(&s, &facts.photos);
     for (size_t i = 0; i < s.view_count; i++) {
         facts.views_by_model[s.views[i].camera.model]++;
+        facts.rolling_views += !camera_is_still(&s.views[i].camera);
         facts.test_views += s.views[i].is_test;
     }
     facts.expect = expect_training(&s, 0, parallel_threads(), cpu_best_isa());

@@ -41,8 +41,10 @@ static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weigh
 /* terms[k] lane i, i < count and 16, is added to sum k of the record of entry i. */
 static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[16], gradient_list *out)
 {
-    _Alignas(64) float field[16][16], sums[16];
+    _Static_assert(sizeof(gradient_record) == 16 * sizeof(float), "the id stands behind the sums");
+    _Alignas(64) float field[16][16];
     const float *rows[16];
+    const vmask16 sums = vmask16_from_bits((1u << GRADIENT_FLOATS) - 1);
     vfloat16 of_entry[16];
     for (int k = 0; k < 16; k++)
         vfloat16_store(field[k], terms[k]), rows[k] = field[k];
@@ -51,9 +53,9 @@ static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[
         gradient_record *g = gradient_list_find(out, entry[i].id);
         if (g == NULL)
             return false;
-        vfloat16_store(sums, of_entry[i]);
-        for (int k = 0; k < GRADIENT_FLOATS; k++)
-            g->sum[k] += sums[k];
+        float *record = (float *)(void *)g; /* all of it: the id is not added to */
+        const vfloat16 before = vfloat16_load(record);
+        vfloat16_store(record, vfloat16_select(sums, vfloat16_add(before, of_entry[i]), before));
     }
     return true;
 }

@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-#include "base/camera_pose.h"
 #include "train/photos.h"
 #include "train/step_size.h"
 
@@ -12,8 +11,6 @@
    rays have twice the hits. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo on
    two cores of a server CPU (bench/figures.py), which they meet within a quarter. */
 static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76, hits_of_last_part = 2;
-/* A pixel takes so many times as long when its rays start at different points: they go through the tree. */
-static const double rolling_factor = 2.2;
 static const double score_core_seconds_per_megapixel = 5.5;
 static const double default_budget_seconds = 600;
 
@@ -28,8 +25,7 @@ static double core_seconds_of_step(const gbt_camera *camera, const train_rules *
     double steps_per_second = 0;
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double progress = (part + 0.5) / PACE_SEGMENTS,
-                     megapixels = step_size_of(camera, rules, progress).pixels / 1e6 *
-                                  (camera_is_still(camera) ? 1 : rolling_factor),
+                     megapixels = step_size_of(camera, rules, progress).pixels / 1e6,
                      hits = progress < SCHEDULE_EXACT_FROM ? 1 : hits_of_last_part;
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;

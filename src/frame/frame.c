@@ -10,6 +10,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "frame/one_start.h"
 #include "frame/plain.h"
 #include "frame/plain_view.h"
 #include "frame/visible.h"
@@ -122,6 +123,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                                f->draw.makes_faint ? 0 : settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
+    if (shot->one_start)
+        GBT_TRY(one_start_move(&shot->camera, &f->rays.lens, &f->wide, err));
     f->times.decode = stage_lap(&clock);
     f->times.build = (stage_time){0};
     memset(&f->counters, 0, sizeof f->counters);
@@ -172,7 +175,8 @@ gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *came
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
                         const trace_settings *settings, bool keep_tape, gbt_error *err)
 {
-    const ray_shot shot = ray_shot_of(camera);
+    ray_shot shot = ray_shot_of(camera);
+    shot.one_start = f->draw.one_start && f->draw.footprint > 0 && !camera_is_still(camera);
     GBT_TRY(prepare(f, subject, &shot, settings, NULL, err));
     stage_clock clock = stage_begin();
     float *through = NULL;

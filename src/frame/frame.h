@@ -38,6 +38,9 @@ typedef struct frame_drawing {
     int pixel_step;  /* the camera's pixels are every n-th of a picture, and as wide as that one's; 0 and 1:
                         all */
     frame_sight sight;
+    bool one_start; /* rays of a camera that moves while it is read out start at one point, and Gaussians move
+                       in their place (frame/one_start.h): lists take the place of the tree. An approximation,
+                       for training; it needs a footprint */
     bool makes_faint;          /* Gaussians of opacity below alpha_min are made, though not drawn */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for;
                                   borrowed */

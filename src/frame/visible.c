@@ -241,12 +241,14 @@ static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double
 }
 
 /* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its
-   radius R, and with the focus at F a slope by at most R / F and a direction by at most asin(R / F). */
+   radius R, and with the focus at F a slope by at most R / F and a direction by at most asin(R / F). With
+   ray_shot.one_start the camera starts them at most half of its way from where they do. */
 gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
 {
     bounds_job job = {.rays = rays};
     const double aperture = shot->given == NULL ? shot->aperture_radius : 0,
-                 spread = aperture > 0 ? aperture / shot->focus_distance : 0;
+                 spread = aperture > 0 ? aperture / shot->focus_distance : 0,
+                 around = aperture + (shot->one_start ? 0.5 * dvec_length(shot->camera.motion) : 0);
     const size_t rows = (size_t)rays->height, count = parallel_block_count(rows, ROW_GRAIN);
     job.blocks = mem_alloc(count, sizeof *job.blocks, "view bounds", err);
     if (job.blocks == NULL)
@@ -279,12 +281,12 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     }
     mem_free(job.blocks);
     /* Origins were rounded to float. */
-    const double rounding = 1e-6 * (dvec_length(job.center) + sqrt(all.origin_square) + aperture);
-    const bool one_origin = rays->common_origin && aperture <= 0;
-    out->origin_radius = one_origin ? 0 : (float)(sqrt(all.origin_square) + aperture + rounding);
+    const double rounding = 1e-6 * (dvec_length(job.center) + sqrt(all.origin_square) + around);
+    const bool one_origin = rays->common_origin && around <= 0;
+    out->origin_radius = one_origin ? 0 : (float)(sqrt(all.origin_square) + around + rounding);
     for (int p = 0; p < VIEW_PLANES; p++) {
         const double farthest = rays->common_origin ? 0 : fmax(all.offset[p], -1e18);
-        out->offset[p] = one_origin ? 0 : (float)(farthest + aperture + rounding);
+        out->offset[p] = one_origin ? 0 : (float)(farthest + around + rounding);
         for (int k = 0; k < 3; k++)
             out->plane[p][k] = (float)job.normal[p][k];
     }

@@ -148,7 +148,7 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
     const int width = shot->camera.width;
     const double v = (row + 0.5 - job->lens.cy) / job->lens.fy;
     const bool opens = shot->aperture_radius > 0;
-    for (int i = 0; i < width; i++, origin += 3, dir += 3) {
+    for (int i = 0; i < width; i++, dir += 3) {
         const size_t pixel = (size_t)row * (size_t)width + (size_t)i;
         const pose *at = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS      ? row
                                        : job->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? i
@@ -171,7 +171,8 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
         dmat_apply_transposed(at->rotation, start, start);
         dmat_apply_transposed(at->rotation, d, d);
         for (int k = 0; k < 3; k++) {
-            origin[k] = (float)(at->center[k] + start[k]);
+            if (origin != NULL)
+                origin[3 * i + k] = (float)(at->center[k] + start[k]);
             dir[k] = (float)d[k];
         }
     }
@@ -373,8 +374,8 @@ static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gb
                          ray_shot_sample_count(shot));
     job.cell = find_cell(sample, ray_shot_sample_count(shot));
     const bool flat = job.lens.kind == LENS_ORTHOGRAPHIC;
-    const bool common_origin =
-        !flat && job.shutter == GBT_CAMERA_SHUTTER_GLOBAL && !(shot->aperture_radius > 0);
+    const bool common_origin = !flat && (job.shutter == GBT_CAMERA_SHUTTER_GLOBAL || shot->one_start) &&
+                               !(shot->aperture_radius > 0);
     job.pinhole = job.lens.kind == LENS_PERSPECTIVE && !job.lens.radial && !job.lens.extra;
     GBT_TRY(ray_image_reserve(out, shot->camera.width, shot->camera.height, common_origin, err));
     out->lens = job.lens;

@@ -40,7 +40,9 @@ typedef struct ray_image {
 
 /** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
 typedef struct ray_shot {
-    gbt_camera camera;      /* lens, size, pose, and its motion while a rolling shutter reads it out */
+    gbt_camera camera; /* lens, size, pose, and its motion while a rolling shutter reads it out */
+    bool one_start;    /* all rays of a rolling shutter start at the centre of the camera's own pose, and look
+                          where    they look. Default false */
     double aperture_radius; /* >= 0; 0, the default, is a pinhole */
     double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where
                                it is a sphere */

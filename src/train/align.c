@@ -78,6 +78,7 @@ gbt_status align_held_out(trainer *t, gbt_error *err)
     step_view *v = &t->views[0]; /* its memory is free between steps */
     v->frame.draw.pixel_step = 1;
     v->frame.draw.renderer = t->renderer;
+    v->frame.draw.one_start = false;
     for (size_t i = 0; i < t->scene.view_count; i++)
         if (t->scene.views[i].is_test)
             GBT_TRY(align_view(t, v, i, err));

@@ -251,6 +251,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         t->views[0].frame.draw.pixel_step = 1;
         t->views[0].frame.draw.renderer = t->renderer;
+        t->views[0].frame.draw.one_start = false;
         trace_settings settings = t->settings;
         settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[i]);
         status = frame_render(&t->views[0].frame, frame_neural(&t->anchors, &t->decoder), &camera, &settings,

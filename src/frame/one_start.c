@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* frame/one_start.c -- for each Gaussian the line of the image that takes its mean, and the camera's place
+   then. */
+#include "frame/one_start.h"
+
+#include <math.h>
+
+#include "base/camera_pose.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+
+enum {
+    MOVE_BLOCK = 1024, /* Gaussians */
+    STEPS = 3          /* each leaves the share of the image that the motion moves a point by */
+};
+
+typedef struct line_pose {
+    double rotation[9], center[3];
+} line_pose;
+
+typedef struct move_job {
+    const gbt_camera *camera;
+    const camera_lens *lens;
+    const line_pose *poses; /* [lines] */
+    int lines;
+    gaussians *g;
+} move_job;
+
+/* The line of the image that takes a point, or the edge nearest to it; -1 when the camera does not see it. */
+static int find_line(const move_job *job, const double point[3])
+{
+    const int axis = job->camera->shutter == GBT_CAMERA_SHUTTER_ROWS;
+    int line = job->lines / 2;
+    for (int step = 0; step < STEPS; step++) {
+        const line_pose *at = &job->poses[line];
+        double cam[3], pixel[2];
+        for (int k = 0; k < 3; k++)
+            cam[k] = point[k] - at->center[k];
+        dmat_apply(at->rotation, cam, cam);
+        if (!camera_lens_project(job->lens, cam, pixel))
+            return -1;
+        line = (int)fmin(fmax(pixel[axis], 0), job->lines - 1);
+    }
+    return line;
+}
+
+static void move_block(size_t block, size_t begin, size_t end, void *context)
+{
+    const move_job *job = context;
+    const double *middle = job->camera->center;
+    float *const mean[3] = {job->g->mean_x, job->g->mean_y, job->g->mean_z};
+    (void)block;
+    for (size_t i = begin; i < end; i++) {
+        const double point[3] = {(double)mean[0][i], (double)mean[1][i], (double)mean[2][i]};
+        const int line = find_line(job, point);
+        for (int k = 0; k < 3 && line >= 0; k++)
+            mean[k][i] = (float)(point[k] - (job->poses[line].center[k] - middle[k]));
+    }
+}
+
+gbt_status one_start_move(const gbt_camera *camera, const camera_lens *lens, gaussians *g, gbt_error *err)
+{
+    const int lines = camera->shutter == GBT_CAMERA_SHUTTER_ROWS ? camera->height : camera->width;
+    line_pose *poses = mem_alloc((size_t)lines, sizeof *poses, "poses", err);
+    if (poses == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (int i = 0; i < lines; i++)
+        camera_pose_during(camera, (i + 0.5) / lines, poses[i].rotation, poses[i].center);
+    move_job job = {.camera = camera, .lens = lens, .poses = poses, .lines = lines, .g = g};
+    parallel_blocks(g->count, MOVE_BLOCK, move_block, &job);
+    mem_free(poses);
+    return GBT_OK;
+}

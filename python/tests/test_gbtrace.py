@@ -135,6 +135,22 @@ class Cameras(unittest.TestCase):
         turned = camera.moved([0, 0, 0, 0, 0.1, 0])  # about down, right-handed: forward turns to the right
         self.assertGreater(turned.rotation[2] @ camera.rotation[0], 0.09)
 
+    def test_a_rolling_shutter(self):
+        """The middle row is what a still camera sees; the first is what it sees after half of the motion, backwards."""
+        camera, motion = a_camera(), np.array([0.2, 0.1, -0.1, 0.02, 0.05, -0.03])
+        self.assertEqual((camera.shutter, camera.motion.tolist()), ("global", [0] * 6))
+        rolling = camera.moved([0] * 6)
+        rolling.shutter, rolling.motion = "rows", motion
+        self.assertEqual((rolling.shutter, rolling._c.motion[:]), ("rows", motion.tolist()))
+        with gbtrace.Model(MODEL) as model:
+            picture, rows = model.render(rolling), camera.height
+            for row in (0, rows // 2, rows - 1):
+                there = model.render(camera.moved(((row + 0.5) / rows - 0.5) * motion))
+                self.assertLess(abs(picture[row] - there[row]).max(), 0.02)
+            self.assertGreater(abs(picture[0] - model.render(camera)[0]).max(), 0.05)
+        with self.assertRaisesRegex(ValueError, "wanted one of global, rows, columns"):
+            rolling.shutter = "up"
+
     def test_what_is_wrong_is_said(self):
         with self.assertRaisesRegex(ValueError, "OPENCV_FISHEYE"):
             gbtrace.Camera("FISHY", 4, 4)

@@ -66,6 +66,8 @@ make fisheye "$points\"camera_model\": \"OPENCV_FISHEYE\", "
 make masked "$points" && mkdir masked/masks || exit 1
 for photo in plain/images/*.png; do cp plain/images/0003.png "masked/masks/${photo##*/}"; done
 make pointless ''
+make rolling "$points\"rolling_shutter\": [0, 0, 1, 0], " # the camera climbs while it is read out
+sed -i 's/"transform_matrix": \(.*\)\[0,1,0,0.5\]\(,\[0,0,0,1\]\]\)/"transform_matrix_start": \1[0,1,0,0.45]\2, "transform_matrix_end": \1[0,1,0,0.6]\2/' rolling/transforms.json
 
 # ---- what is made of them
 [ -z "$isa" ] || export GBT_ISA="$isa"
@@ -88,6 +90,7 @@ run exposure plain --exposure
 run masked-run masked
 run fisheye-run fisheye
 run bent-run bent
+run rolling-run rolling
 run pointless-run pointless
 "$program" train plain -o goes-on --iterations 20 --quiet >/dev/null 2>&1
 "$program" train -o goes-on --resume --iterations 40 --lossless --quiet >out 2>&1 || cat out
@@ -113,7 +116,7 @@ draw exports/a.ply -o drawn-ply --data plain --format exr
 for init in gb adaptive voxel; do "$program" init plain -o exports/$init.ply --init $init --quiet >out 2>&1 || cat out; done
 
 # ---- compare
-rm -rf plain bent fisheye masked pointless out gaussians.ply points.ply
+rm -rf plain bent fisheye masked pointless rolling out gaussians.ply points.ply
 for file in $(find . -name '*.exr'); do # they hold the time when they were written
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done

@@ -123,7 +123,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                                f->draw.makes_faint ? 0 : settings->alpha_min, &f->gaussians, &f->tape, err));
     if (f->widened)
         GBT_TRY(widen(f, subject, err));
-    if (shot->one_start)
+    if (shot->one_start && f->rays.common_origin)
         GBT_TRY(one_start_move(&shot->camera, &f->rays.lens, &f->wide, err));
     f->times.decode = stage_lap(&clock);
     f->times.build = (stage_time){0};

@@ -255,6 +255,9 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
                          "camera: model %d has unusable parameters (wanted a known model, finite values, "
                          "focal length > 0)",
                          (int)camera->model);
+    if ((unsigned)camera->shutter > GBT_CAMERA_SHUTTER_COLUMNS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: shutter %d (wanted 0 to %d)", (int)camera->shutter,
+                         GBT_CAMERA_SHUTTER_COLUMNS);
     if (!pose_is_finite(camera))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
     if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))

@@ -376,8 +376,8 @@ static void nothing_comes_from_nothing(void **state)
 static void bad_shots(void **state)
 {
     (void)state;
-    ray_shot bad[13];
-    for (int i = 0; i < 13; i++) {
+    ray_shot bad[14];
+    for (int i = 0; i < 14; i++) {
         bad[i] = shot_of(i == 9 ? GBT_CAMERA_ORTHOGRAPHIC : GBT_CAMERA_PINHOLE);
         bad[i].aperture_radius = 0.1;
         bad[i].focus_distance = 1;
@@ -395,7 +395,8 @@ static void bad_shots(void **state)
     bad[10].camera.rotation[3] = INFINITY;
     bad[11].camera.width = 0;
     bad[12].camera.model = (gbt_camera_model)99;
-    for (int i = 0; i < 13; i++) {
+    bad[13].camera.shutter = (gbt_camera_shutter)3;
+    for (int i = 0; i < 14; i++) {
         ray_image rays = {0};
         gbt_error err = {0};
         assert_int_equal(ray_image_from_shot(&bad[i], 0, &rays, &err), GBT_ERR_ARGUMENT);

@@ -3,7 +3,7 @@
 # rays_first -- training by rays from the first step beside splats first, at equal time; and training on fisheyes, panoramas and rolling
 # shutters beside pinholes.
 #
-#     python3 bench/rays_first.py PHOTOS -o DIR [--budget 42s] [--seeds 3] [--gbtrace build/release/gbtrace]
+#     python3 bench/rays_first.py PHOTOS -o DIR [--budget 42s] [--seeds 3] [--iterations N] [--gbtrace build/release/gbtrace]
 #
 # PHOTOS holds the data sets plush, fox, castle and aerial; the courtyard is made by `gbtrace make-scene`, also as a fisheye of 180 degrees, as
 # a panorama and by moving cameras, with as many pixels. Each run goes into DIR/NAME and is not repeated when it is there. Two tables go to stdout: per scene the

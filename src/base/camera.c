@@ -21,7 +21,7 @@ bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origi
     double start[3], forward[3];
     if (!camera_lens_prepare(camera, &lens) || !camera_lens_unproject(&lens, px, py, forward))
         return false;
-    const gbt_camera at = gbt_camera_at(camera, px, py);
+    const camera_pose at = camera_pose_at(camera, px, py);
     camera_lens_origin(&lens, px, py, start);
     dmat_apply_transposed(at.rotation, start, start);
     dmat_apply_transposed(at.rotation, forward, dir);
@@ -36,31 +36,24 @@ bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], dou
     return camera_lens_prepare(camera, &lens) && camera_lens_project(&lens, point_cam, pixel);
 }
 
-static bool pixel_of_pose(const gbt_camera *pose, const camera_lens *lens, const double point[3],
-                          double pixel[2])
-{
-    double cam[3];
-    for (int i = 0; i < 3; i++)
-        cam[i] = point[i] - pose->center[i];
-    dmat_apply(pose->rotation, cam, cam);
-    return camera_lens_project(lens, cam, pixel);
-}
-
 bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2])
 {
     enum { STEPS_MAX = 50 }; /* each leaves the share of the image's height that the motion moves a point */
     camera_lens lens;
-    if (!camera_lens_prepare(camera, &lens) || !pixel_of_pose(camera, &lens, point, pixel))
+    camera_pose pose = camera_pose_during(camera, 0.5);
+    if (!camera_lens_prepare(camera, &lens) || !camera_pose_pixel(&pose, &lens, point, pixel))
         return false;
-    for (int i = 0; i < STEPS_MAX && !camera_is_still(camera); i++) {
+    if (camera_is_still(camera))
+        return true;
+    for (int i = 0; i < STEPS_MAX; i++) {
         const double before[2] = {pixel[0], pixel[1]};
-        const gbt_camera at = gbt_camera_at(camera, pixel[0], pixel[1]);
-        if (!pixel_of_pose(&at, &lens, point, pixel))
+        pose = camera_pose_at(camera, pixel[0], pixel[1]);
+        if (!camera_pose_pixel(&pose, &lens, point, pixel))
             return false;
         if (fabs(pixel[0] - before[0]) + fabs(pixel[1] - before[1]) < 1e-9)
             return true;
     }
-    return camera_is_still(camera);
+    return false;
 }
 
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "base/vec.h"
 
 static bool is_finite(const double *values, int count)
@@ -139,12 +140,48 @@ bool camera_is_still(const gbt_camera *camera)
     return !moves || camera->shutter == GBT_CAMERA_SHUTTER_GLOBAL;
 }
 
-void camera_pose_during(const gbt_camera *camera, double share, double rotation[9], double center[3])
+camera_pose camera_pose_during(const gbt_camera *camera, double share)
 {
-    memcpy(rotation, camera->rotation, sizeof camera->rotation);
-    memcpy(center, camera->center, sizeof camera->center);
+    camera_pose out;
+    memcpy(out.rotation, camera->rotation, sizeof out.rotation);
+    memcpy(out.center, camera->center, sizeof out.center);
     if (share != 0.5 && !camera_is_still(camera))
-        move(camera->motion, share - 0.5, rotation, center);
+        move(camera->motion, share - 0.5, out.rotation, out.center);
+    return out;
+}
+
+camera_pose camera_pose_at(const gbt_camera *camera, double px, double py)
+{
+    return camera_pose_during(camera, camera->shutter == GBT_CAMERA_SHUTTER_ROWS      ? py / camera->height
+                                      : camera->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? px / camera->width
+                                                                                      : 0.5);
+}
+
+camera_pose *camera_line_poses(const gbt_camera *camera, int *count, gbt_error *err)
+{
+    *count = camera_is_still(camera)                      ? 1
+             : camera->shutter == GBT_CAMERA_SHUTTER_ROWS ? camera->height
+                                                          : camera->width;
+    camera_pose *poses = mem_alloc((size_t)*count, sizeof *poses, "poses", err);
+    for (int i = 0; i < *count && poses != NULL; i++)
+        poses[i] = camera_pose_during(camera, (i + 0.5) / *count);
+    return poses;
+}
+
+bool camera_pose_pixel(const camera_pose *pose, const camera_lens *lens, const double point[3],
+                       double pixel[2])
+{
+    double cam[3];
+    for (int i = 0; i < 3; i++)
+        cam[i] = point[i] - pose->center[i];
+    dmat_apply(pose->rotation, cam, cam);
+    return camera_lens_project(lens, cam, pixel);
+}
+
+static void stand_at(const camera_pose *pose, gbt_camera *camera)
+{
+    memcpy(camera->rotation, pose->rotation, sizeof pose->rotation);
+    memcpy(camera->center, pose->center, sizeof pose->center);
 }
 
 gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height)
@@ -155,8 +192,9 @@ gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double w
     const bool by_rows = camera->shutter == GBT_CAMERA_SHUTTER_ROWS;
     const double all = by_rows ? camera->height : camera->width, first = (by_rows ? y : x) / all,
                  span = (by_rows ? height : width) / all;
+    const camera_pose middle = camera_pose_during(camera, first + 0.5 * span);
     double way[3];
-    camera_pose_during(camera, first + 0.5 * span, out.rotation, out.center);
+    stand_at(&middle, &out);
     dmat_apply_transposed(camera->rotation, camera->motion, way); /* a line in the world */
     dmat_apply(out.rotation, way, out.motion);
     for (int i = 0; i < 6; i++)
@@ -164,18 +202,11 @@ gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double w
     return out;
 }
 
-/* Share of the readout in which an image point is taken. */
-static double share_of(const gbt_camera *camera, double px, double py)
-{
-    return camera->shutter == GBT_CAMERA_SHUTTER_ROWS      ? py / camera->height
-           : camera->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? px / camera->width
-                                                           : 0.5;
-}
-
 gbt_camera gbt_camera_at(const gbt_camera *camera, double px, double py)
 {
     gbt_camera out = *camera;
-    camera_pose_during(camera, share_of(camera, px, py), out.rotation, out.center);
+    const camera_pose pose = camera_pose_at(camera, px, py);
+    stand_at(&pose, &out);
     out.shutter = GBT_CAMERA_SHUTTER_GLOBAL;
     memset(out.motion, 0, sizeof out.motion);
     return out;

@@ -6,7 +6,9 @@
 
 #include <stdbool.h>
 
+#include "base/camera_lens.h"
 #include "gbtrace/camera.h"
+#include "gbtrace/status.h"
 
 /** A camera on its way from one pose to another: turning about one axis at one rate (slerp), moving along a
     line. */
@@ -25,9 +27,25 @@ void camera_motion_at(const camera_motion *motion, double t, double rotation[9],
 /** Does the camera stand still while its image is taken? So it does when its motion is zero. */
 bool camera_is_still(const gbt_camera *camera);
 
+/** World to camera, and the centre. */
+typedef struct camera_pose {
+    double rotation[9], center[3];
+} camera_pose;
+
 /** Pose when the place `share` of the readout is taken: 0 is the top or left edge of the image, 0.5 the
     camera's own pose, to the bit. */
-void camera_pose_during(const gbt_camera *camera, double share, double rotation[9], double center[3]);
+camera_pose camera_pose_during(const gbt_camera *camera, double share);
+
+/** Pose when an image point is taken. */
+camera_pose camera_pose_at(const gbt_camera *camera, double px, double py);
+
+/** When the middle of each line of the image is taken: a pose per row or column, or one for a camera that
+    stands still. [*count], mem_free(); NULL without memory. */
+camera_pose *camera_line_poses(const gbt_camera *camera, int *count, gbt_error *err);
+
+/** Image point of a point of the world, from one pose; false where the lens does not see it. */
+bool camera_pose_pixel(const camera_pose *pose, const camera_lens *lens, const double point[3],
+                       double pixel[2]);
 
 /** The same camera with the pose and motion that it has while a part of its image is read out: `width` by
     `height` pixels from (x, y) on, which may lie beyond the edges. */

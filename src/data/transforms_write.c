@@ -12,19 +12,16 @@
 /* The pose at a share of the readout: camera to world, OpenGL's axes. NULL without memory. */
 static json_t *matrix_at(const gbt_camera *camera, double share)
 {
-    double r[9], c[3];
-    camera_pose_during(camera, share, r, c);
+    const camera_pose pose = camera_pose_during(camera, share);
+    const double *r = pose.rotation, *c = pose.center;
     return json_pack("[[f,f,f,f],[f,f,f,f],[f,f,f,f],[i,i,i,i]]", r[0], -r[3], -r[6], c[0], r[1], -r[4],
                      -r[7], c[1], r[2], -r[5], -r[8], c[2], 0, 0, 0, 1);
 }
 
 static json_t *frame_of(const char *name, const gbt_camera *camera)
 {
-    json_t *path = json_sprintf("images/%s", name);
-    return camera_is_still(camera)
-               ? json_pack("{s:o,s:o}", "file_path", path, "transform_matrix", matrix_at(camera, 0.5))
-               : json_pack("{s:o,s:o,s:o}", "file_path", path, "transform_matrix_start", matrix_at(camera, 0),
-                           "transform_matrix_end", matrix_at(camera, 1));
+    return json_pack("{s:o,s:o,s:o}", "file_path", json_sprintf("images/%s", name), "transform_matrix_start",
+                     matrix_at(camera, 0), "transform_matrix_end", matrix_at(camera, 1));
 }
 
 static bool is_like(const gbt_camera *a, const gbt_camera *b)

@@ -8,21 +8,16 @@
 #include "base/camera_pose.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/vec.h"
 
 enum {
     MOVE_BLOCK = 1024, /* Gaussians */
     STEPS = 3          /* each leaves the share of the image that the motion moves a point by */
 };
 
-typedef struct line_pose {
-    double rotation[9], center[3];
-} line_pose;
-
 typedef struct move_job {
     const gbt_camera *camera;
     const camera_lens *lens;
-    const line_pose *poses; /* [lines] */
+    const camera_pose *poses; /* [lines] */
     int lines;
     gaussians *g;
 } move_job;
@@ -33,12 +28,8 @@ static int find_line(const move_job *job, const double point[3])
     const int axis = job->camera->shutter == GBT_CAMERA_SHUTTER_ROWS;
     int line = job->lines / 2;
     for (int step = 0; step < STEPS; step++) {
-        const line_pose *at = &job->poses[line];
-        double cam[3], pixel[2];
-        for (int k = 0; k < 3; k++)
-            cam[k] = point[k] - at->center[k];
-        dmat_apply(at->rotation, cam, cam);
-        if (!camera_lens_project(job->lens, cam, pixel))
+        double pixel[2];
+        if (!camera_pose_pixel(&job->poses[line], job->lens, point, pixel))
             return -1;
         line = (int)fmin(fmax(pixel[axis], 0), job->lines - 1);
     }
@@ -61,13 +52,11 @@ static void move_block(size_t block, size_t begin, size_t end, void *context)
 
 gbt_status one_start_move(const gbt_camera *camera, const camera_lens *lens, gaussians *g, gbt_error *err)
 {
-    const int lines = camera->shutter == GBT_CAMERA_SHUTTER_ROWS ? camera->height : camera->width;
-    line_pose *poses = mem_alloc((size_t)lines, sizeof *poses, "poses", err);
+    move_job job = {.camera = camera, .lens = lens, .g = g};
+    camera_pose *poses = camera_line_poses(camera, &job.lines, err);
     if (poses == NULL)
         return GBT_ERR_NO_MEMORY;
-    for (int i = 0; i < lines; i++)
-        camera_pose_during(camera, (i + 0.5) / lines, poses[i].rotation, poses[i].center);
-    move_job job = {.camera = camera, .lens = lens, .poses = poses, .lines = lines, .g = g};
+    job.poses = poses;
     parallel_blocks(g->count, MOVE_BLOCK, move_block, &job);
     mem_free(poses);
     return GBT_OK;

@@ -229,35 +229,37 @@ static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *
     return r->waiting_count < TREE_WIDTH || hit_waiting(r, scene, ray, TREE_WIDTH, scratch, counters);
 }
 
+/* Leaves that the ray enters are visited, nodes wait in the heap. */
+static bool visit_node(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
+                       const tree_node *node, int *heap_count, kernel_scratch *scratch,
+                       kernel_counters *counters)
+{
+    _Alignas(64) float entry[TREE_WIDTH];
+    counters->nodes++;
+    if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)*heap_count,
+                    (size_t)*heap_count + TREE_WIDTH, sizeof *scratch->heap, "nodes of a ray",
+                    NULL) != GBT_OK)
+        return false;
+    for (unsigned bits = walk_children(walk, node, entry); bits != 0; bits &= bits - 1) {
+        const uint64_t child = node->child[__builtin_ctz(bits)];
+        const tree_leaf *leaf = tree_child_leaf(child);
+        if (leaf == NULL)
+            heap_push(scratch->heap, heap_count, entry[__builtin_ctz(bits)], child);
+        else if (!visit_leaf(r, scene, walk, ray, leaf, scratch, counters))
+            return false;
+    }
+    return true;
+}
+
 static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
                        unsigned packet, int lane, hit_tape *tape, kernel_scratch *scratch,
                        kernel_counters *counters)
 {
     int heap_count = 0;
     size_t round = RAY_ROUND;
-    for (uint64_t child = (uint64_t)(uintptr_t)scene->root;;) {
-        const tree_leaf *leaf = tree_child_leaf(child);
-        if (leaf != NULL) {
-            if (!visit_leaf(r, scene, walk, ray, leaf, scratch, counters))
-                return false;
-        } else {
-            const tree_node *node = (const tree_node *)(uintptr_t)child;
-            _Alignas(64) float entry[TREE_WIDTH];
-            counters->nodes++;
-            if (mem_reserve((void **)&scratch->heap, &scratch->heap_capacity, (size_t)heap_count,
-                            (size_t)heap_count + TREE_WIDTH, sizeof *scratch->heap, "nodes of a ray",
-                            NULL) != GBT_OK)
-                return false;
-            for (unsigned bits = walk_children(walk, node, entry); bits != 0; bits &= bits - 1) {
-                const uint64_t next = node->child[__builtin_ctz(bits)];
-                leaf = tree_child_leaf(next);
-                if (leaf != NULL) {
-                    if (!visit_leaf(r, scene, walk, ray, leaf, scratch, counters))
-                        return false;
-                } else
-                    heap_push(scratch->heap, &heap_count, entry[__builtin_ctz(bits)], next);
-            }
-        }
+    for (const tree_node *node = scene->root;;) {
+        if (!visit_node(r, scene, walk, ray, node, &heap_count, scratch, counters))
+            return false;
         if (r->count >= round || heap_count == 0) {
             if (r->waiting_count > 0 && !hit_waiting(r, scene, ray, r->waiting_count, scratch, counters))
                 return false;
@@ -268,7 +270,7 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *
                 return true;
             round = 2 * r->count + RAY_ROUND; /* what stays is sorted again, but not often */
         }
-        child = heap_pop(scratch->heap, &heap_count);
+        node = (const tree_node *)(uintptr_t)heap_pop(scratch->heap, &heap_count);
     }
 }
 

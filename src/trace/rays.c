@@ -27,10 +27,6 @@ static const double origin_max = 1e17;
 /* Directions of so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
 static const size_t kept_rays = (size_t)1 << 23;
 
-typedef struct pose {
-    double rotation[9], center[3];
-} pose;
-
 /* Part of the aperture, in shares of its area and of a turn. */
 typedef struct aperture_cell {
     double area_low, area_span, turn_low, turn_span;
@@ -43,7 +39,7 @@ typedef struct ray_job {
     bool pinhole;
     const double *column_u;     /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
     double *lens_dir;           /* ray_lens.dir; other lenses only */
-    const pose *poses;          /* [1], or one for each row or column */
+    const camera_pose *poses;   /* [1], or one for each row or column */
     gbt_camera_shutter shutter; /* which; GBT_CAMERA_SHUTTER_GLOBAL also for a camera that does not move */
     aperture_cell cell;
     float *origin; /* NULL: one for all */
@@ -65,7 +61,7 @@ FASTEST_CLONE static void pinhole_row(const ray_job *job, const double *r, int r
     }
 }
 
-static void orthographic_row(const ray_job *job, const pose *at, int row, float *origin, float *dir)
+static void orthographic_row(const ray_job *job, const camera_pose *at, int row, float *origin, float *dir)
 {
     const double *r = at->rotation, v = (row + 0.5 - job->lens.cy) / job->lens.fy;
     const float forward[3] = {(float)r[6], (float)r[7], (float)r[8]};
@@ -150,9 +146,9 @@ static void any_row(const ray_job *job, int row, float *origin, float *dir)
     const bool opens = shot->aperture_radius > 0;
     for (int i = 0; i < width; i++, dir += 3) {
         const size_t pixel = (size_t)row * (size_t)width + (size_t)i;
-        const pose *at = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS      ? row
-                                       : job->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? i
-                                                                                    : 0);
+        const camera_pose *at = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS      ? row
+                                              : job->shutter == GBT_CAMERA_SHUTTER_COLUMNS ? i
+                                                                                           : 0);
         double start[3] = {0, 0, 0}, d[3] = {0, 0, 1};
         if (job->lens.kind == LENS_ORTHOGRAPHIC) {
             start[0] = job->column_u[i];
@@ -194,7 +190,7 @@ static void make_rows(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     for (size_t row = begin; row < end; row++) {
         const size_t at = 3 * row * (size_t)width;
-        const pose *stand = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS ? row : 0);
+        const camera_pose *stand = job->poses + (job->shutter == GBT_CAMERA_SHUTTER_ROWS ? row : 0);
         float *origin = job->origin == NULL ? NULL : job->origin + at, *dir = job->dir + at;
         if (shot->aperture_radius > 0 || job->shutter == GBT_CAMERA_SHUTTER_COLUMNS) {
             any_row(job, (int)row, origin, dir);
@@ -330,17 +326,6 @@ static double *make_columns(const ray_job *job, gbt_error *err)
     return u;
 }
 
-static pose *make_poses(const gbt_camera *camera, gbt_camera_shutter shutter, gbt_error *err)
-{
-    const int count = shutter == GBT_CAMERA_SHUTTER_ROWS      ? camera->height
-                      : shutter == GBT_CAMERA_SHUTTER_COLUMNS ? camera->width
-                                                              : 1;
-    pose *poses = mem_alloc((size_t)count, sizeof *poses, "poses", err);
-    for (int i = 0; i < count && poses != NULL; i++)
-        camera_pose_during(camera, (i + 0.5) / count, poses[i].rotation, poses[i].center);
-    return poses;
-}
-
 /* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2
    pi = count): ring j ends with cell count ((j + 1) / m)^2. All pixels take a sample in the same cell, so
    that neighbouring rays stay close. */
@@ -384,7 +369,8 @@ static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gb
     out->lens = job.lens;
     if (!flat && !job.pinhole)
         GBT_TRY(unproject_lens(&job, out, err));
-    pose *poses = make_poses(&shot->camera, job.shutter, err);
+    int pose_count;
+    camera_pose *poses = camera_line_poses(&shot->camera, &pose_count, err);
     double *column_u = poses == NULL ? NULL : make_columns(&job, err);
     if (column_u != NULL) {
         if (common_origin)

@@ -25,17 +25,26 @@ gbt_evaluate_def gbt_evaluate_def_default(void)
                               .cookie_ = DEF_COOKIE};
 }
 
+/* dB that fitted colours must gain before a line says so: what is usual without exposures is below. */
+#define EXPOSURE_HINT 1.0
+
 static void log_scores(const evaluation *e)
 {
     char more[64] = "";
     if (e->lpips_network != NULL)
         snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips,
                  e->lpips.lpips_01);
-    if (e->view_count == 0)
+    if (e->view_count == 0) {
         log_info("no held-out views: scores are n/a");
-    else
-        log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim,
-                 e->flip, more);
+        return;
+    }
+    log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim,
+             e->flip, more);
+    if (!e->exposure && e->psnr_fitted > e->psnr + EXPOSURE_HINT)
+        log_info(
+            "held-out photos differ in exposure from the scene: PSNR is %.2f dB with their colours fitted "
+            "(docs/metrics.md)",
+            e->psnr_fitted);
 }
 
 /**

@@ -27,6 +27,7 @@ static json_t *from_scores(const evaluation *e)
     json_t *root = json_object(), *views = json_array();
     json_object_set_new(root, "schema", json_integer(1));
     json_object_set_new(root, "psnr", json_number(e->psnr));
+    json_object_set_new(root, "psnr_fitted", json_number(e->psnr_fitted));
     json_object_set_new(root, "ssim", json_number(e->ssim));
     json_object_set_new(root, "flip", json_number(e->flip));
     if (e->lpips_network != NULL) {
@@ -39,9 +40,10 @@ static json_t *from_scores(const evaluation *e)
                                         "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_t *view = json_pack("{s:s,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", json_number(v->psnr),
-                                 "ssim", json_number(v->ssim), "flip", json_number(v->flip), "seconds",
-                                 v->seconds, "gaussians", (json_int_t)v->gaussians);
+        json_t *view =
+            json_pack("{s:s,s:o,s:o,s:o,s:o,s:f,s:I}", "name", v->name, "psnr", json_number(v->psnr),
+                      "psnr_fitted", json_number(v->psnr_fitted), "ssim", json_number(v->ssim), "flip",
+                      json_number(v->flip), "seconds", v->seconds, "gaussians", (json_int_t)v->gaussians);
         if (e->lpips_network != NULL)
             add_lpips(view, &v->lpips);
         json_array_append_new(views, view);

@@ -35,6 +35,8 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
         status = image_alloc(&error_map, render->width, render->height, 1, err);
     if (status == GBT_OK)
         status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
+    if (status == GBT_OK)
+        status = image_psnr_fitted(render, &photo, valid, &score->psnr_fitted, err);
     score->psnr = scores.psnr;
     score->ssim = scores.ssim;
     score->flip = scores.flip;
@@ -121,6 +123,7 @@ gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips 
             continue;
         scored++;
         e->psnr += v->psnr;
+        e->psnr_fitted += v->psnr_fitted;
         e->ssim += v->ssim;
         e->flip += v->flip;
         e->lpips.lpips += v->lpips.lpips;
@@ -131,6 +134,7 @@ gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips 
     e->lpips.lpips_01 /= n;
     e->lpips_network = net != NULL ? lpips_network(net) : NULL;
     e->psnr /= n;
+    e->psnr_fitted /= n;
     e->ssim /= n;
     e->flip /= n;
     e->gaussians_per_view /= (double)e->view_count;

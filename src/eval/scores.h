@@ -14,8 +14,10 @@ enum { VIEW_PATH_SIZE = 4096 };
 
 typedef struct view_score {
     char name[1024];
-    double psnr, ssim, flip, seconds; /* seconds: decode, tree and trace of this view */
-    lpips_scores lpips;               /* with a network */
+    double psnr, ssim, flip;
+    double psnr_fitted; /* image_psnr_fitted() */
+    double seconds;     /* decode, tree and trace of this view */
+    lpips_scores lpips; /* with a network */
     size_t gaussians;
     bool masked; /* some pixels of the photo do not count */
     char render_path[VIEW_PATH_SIZE], photo_path[VIEW_PATH_SIZE],
@@ -26,7 +28,7 @@ typedef struct view_score {
 typedef struct evaluation {
     view_score *views;
     size_t view_count;
-    double psnr, ssim, flip, gaussians_per_view;
+    double psnr, psnr_fitted, ssim, flip, gaussians_per_view;
     lpips_scores lpips;
     const char *lpips_network; /* "vgg", "alex"; NULL: there are no such scores */
     size_t anchors, model_bytes;

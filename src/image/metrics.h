@@ -84,6 +84,16 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
 gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure,
                              image *flip_map, image_scores *out, gbt_error *err);
 
+/**
+ * PSNR after the 3 x 4 colour matrix that brings the render nearest to the photo, by least squares
+ * (affine_fit()): what would be left if the photo's exposure were known.
+ *
+ * @param psnr [out] dB; NaN without a pixel that counts
+ * @return GBT_OK or GBT_ERR_NO_MEMORY
+ */
+gbt_status image_psnr_fitted(const image *render, const image *photo, const unsigned char *valid,
+                             double *psnr, gbt_error *err);
+
 /** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS
     and its successors do. */
 typedef struct lpips_scores {

@@ -95,3 +95,17 @@ gbt_status image_score_photo(image *render, image *photo, const unsigned char *v
                ? GBT_OK
                : image_score(render, photo, valid, flip_map, exposure ? &whole : out, err);
 }
+
+gbt_status image_psnr_fitted(const image *render, const image *photo, const unsigned char *valid,
+                             double *psnr, gbt_error *err)
+{
+    image fitted = {0};
+    float matrix[AFFINE_NUMBERS];
+    GBT_TRY(image_alloc(&fitted, render->width, render->height, 3, err));
+    affine_fit(render, photo, valid, 0, render->width, matrix);
+    affine_apply(matrix, render, &fitted);
+    image_quantize(&fitted);
+    *psnr = metric_psnr_valid(&fitted, photo, valid);
+    image_free(&fitted);
+    return GBT_OK;
+}

@@ -21,6 +21,7 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
     char folder[4096];
     const json_t *views = json_object_get(metrics, "views");
     *e = (evaluation){.psnr = metrics_number(metrics, "psnr"),
+                      .psnr_fitted = metrics_number(metrics, "psnr_fitted"),
                       .ssim = metrics_number(metrics, "ssim"),
                       .flip = metrics_number(metrics, "flip"),
                       .lpips = {metrics_number(metrics, "lpips"), metrics_number(metrics, "lpips_01")},

@@ -54,6 +54,11 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
     else
         text_number(out, e->psnr, 2);
     close_tile(out, isnan(e->psnr) ? "" : "dB");
+    if (isfinite(e->psnr_fitted)) {
+        open_tile(out, "PSNR, colours fitted");
+        text_number(out, e->psnr_fitted, 2);
+        close_tile(out, "dB");
+    }
     open_tile(out, "SSIM");
     text_number(out, e->ssim, 4);
     close_tile(out, "");

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/image/test_affine.c -- colour matrices: by hand, adjoint against differences, least squares that come
-   back, halves. */
+   back, halves, PSNR with colours fitted. */
 #include "image_support.h"
 
 #include "base/parallel.h"
 #include "image/affine.h"
+#include "image/metrics.h"
 
 static void fill_matrix(float m[AFFINE_NUMBERS], uint64_t seed)
 {
@@ -234,6 +235,37 @@ static void halves(void **state)
     image_free(&other);
 }
 
+/* A photo of another exposure is 8-bit rounding away once its colours are fitted; what a mask covers does not
+   count. */
+static void fitted_psnr_leaves_exposure_out(void **state)
+{
+    (void)state;
+    const float exposure[AFFINE_NUMBERS] = {0.7f, 0.05f, 0, 0.02f, 0, 0.8f, 0, 0.01f, 0.03f, 0, 0.75f, 0};
+    image render = make_noise(32, 24, 3, 4), photo = make_image(32, 24, 3);
+    unsigned char valid[32 * 24];
+    affine_apply(exposure, &render, &photo);
+    image_quantize(&render);
+    image_quantize(&photo);
+    double psnr;
+    assert_ok(image_psnr_fitted(&render, &photo, NULL, &psnr, NULL));
+    print_message("PSNR %.2f dB, colours fitted %.2f dB\n", metric_psnr(&render, &photo), psnr);
+    assert_true(metric_psnr(&render, &photo) < 20 && psnr > 53);
+    for (int i = 0; i < 32 * 24; i++) {
+        valid[i] = i % 5 != 0;
+        if (!valid[i])
+            photo.pixels[3 * i] = 1 - photo.pixels[3 * i];
+    }
+    double masked;
+    assert_ok(image_psnr_fitted(&render, &photo, NULL, &psnr, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, valid, &masked, NULL));
+    assert_true(psnr < 30 && masked > 53);
+    memset(valid, 0, sizeof valid);
+    assert_ok(image_psnr_fitted(&render, &photo, valid, &psnr, NULL));
+    assert_true(isnan(psnr));
+    image_free(&render);
+    image_free(&photo);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -245,6 +277,7 @@ int main(void)
         cmocka_unit_test(poor_pictures_fit_too),
         cmocka_unit_test(masked_pixels_are_not_fitted),
         cmocka_unit_test(halves),
+        cmocka_unit_test(fitted_psnr_leaves_exposure_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,7 +128,7 @@ static gbt_status read_points(const source_file *file, const colmap_image_id *im
             return raw_fail(err, track, "a track of %llu entries cannot be in the %zu bytes that follow",
                             (unsigned long long)track_count, cursor_left(&c));
         for (uint64_t k = 0; k < track_count; k++) {
-            GBT_TRY(colmap_add_point_depth(out, images, cursor_u32(&c), position, err));
+            GBT_TRY(colmap_add_sighting(out, images, cursor_u32(&c), position, err));
             cursor_skip(&c, 4);
         }
         raw_add_point(out, position, color);

@@ -105,14 +105,14 @@ gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_i
     return GBT_OK;
 }
 
-gbt_status colmap_add_point_depth(raw_scene *raw, const colmap_image_id *images, uint32_t id,
-                                  const double position[3], gbt_error *err)
+gbt_status colmap_add_sighting(raw_scene *raw, const colmap_image_id *images, uint32_t id,
+                               const double position[3], gbt_error *err)
 {
     const colmap_image_id key = {.id = id};
     const colmap_image_id *found =
         raw->view_count > 0 ? bsearch(&key, images, raw->view_count, sizeof key, by_image_id) : NULL;
     if (found != NULL)
-        return raw_add_point_depth(&raw->views[found->view], position, err);
+        return raw_add_sighting(raw, found->view, position, err);
     raw->tracks_missing++;
     return GBT_OK;
 }

@@ -48,9 +48,9 @@ typedef struct colmap_image_id {
 gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images,
                                 gbt_error *err);
 
-/** A track says that the point at `position` is in the photo of image `id`, which is looked up in
+/** As raw_add_sighting(), for a track's entry: the photo of image `id`, which is looked up in
     colmap_images_sorted(). */
-gbt_status colmap_add_point_depth(raw_scene *raw, const colmap_image_id *images, uint32_t id,
-                                  const double position[3], gbt_error *err);
+gbt_status colmap_add_sighting(raw_scene *raw, const colmap_image_id *images, uint32_t id,
+                               const double position[3], gbt_error *err);
 
 #endif

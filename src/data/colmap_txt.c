@@ -201,7 +201,7 @@ static gbt_status read_point(text_lines *lines, const colmap_image_id *images, r
         uint64_t image_id;
         GBT_TRY(take_uint(lines, "a track's image id", UINT32_MAX, &image_id, err));
         GBT_TRY(take_uint(lines, "a track's observation", UINT32_MAX, &ignored, err));
-        GBT_TRY(colmap_add_point_depth(out, images, (uint32_t)image_id, position, err));
+        GBT_TRY(colmap_add_sighting(out, images, (uint32_t)image_id, position, err));
     }
     raw_add_point(out, position, color);
     return GBT_OK;

@@ -35,7 +35,7 @@ void raw_view_free(raw_view *view)
     mem_free(view->name);
     mem_free(view->path);
     mem_free(view->mask_path);
-    mem_free(view->point_depths);
+    mem_free(view->seen);
     memset(view, 0, sizeof *view);
 }
 
@@ -79,40 +79,57 @@ gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err)
     return raw->position != NULL && raw->color != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
+static bool is_usable(const double position[3])
+{
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT))
+            return false;
+    return true;
+}
+
 void raw_add_point(raw_scene *raw, const double position[3], const float color[3])
 {
     if ((raw->point_count + raw->points_dropped) % CHECK_POINTS == 0)
         paged_check();
-    for (int k = 0; k < 3; k++)
-        if (!(fabs(position[k]) <= RAW_COORDINATE_LIMIT)) {
-            raw->points_dropped++;
-            return;
-        }
+    if (!is_usable(position)) {
+        raw->points_dropped++;
+        return;
+    }
     memcpy(raw->position + 3 * raw->point_count, position, 3 * sizeof *position);
     for (int k = 0; k < 3; k++)
         raw->color[3 * raw->point_count + k] = color[k] >= 0 ? fminf(color[k], 1) : 0; /* NaN becomes 0 */
     raw->point_count++;
 }
 
-gbt_status raw_add_point_depth(raw_view *view, const double position[3], gbt_error *err)
+gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3], gbt_error *err)
 {
-    double depth = 0;
-    for (int k = 0; k < 3; k++)
-        depth += view->camera.rotation[6 + k] * (position[k] - view->camera.center[k]);
-    if (!(depth > 0 && depth <= RAW_COORDINATE_LIMIT))
+    raw_view *v = &raw->views[view];
+    if (!is_usable(position) || raw->point_count > UINT32_MAX)
         return GBT_OK;
-    GBT_TRY(mem_reserve((void **)&view->point_depths, &view->point_depth_capacity, view->point_depth_count,
-                        view->point_depth_count + 1, sizeof *view->point_depths, "depths", err));
-    view->point_depths[view->point_depth_count++] = (float)depth;
+    GBT_TRY(mem_reserve((void **)&v->seen, &v->seen_capacity, v->seen_count, v->seen_count + 1,
+                        sizeof *v->seen, "tracks", err));
+    v->seen[v->seen_count++] = (uint32_t)raw->point_count;
     return GBT_OK;
 }
 
-double raw_nearest_depth(raw_view *view)
+gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err)
 {
-    if (view->point_depth_count == 0)
-        return 0;
-    qsort(view->point_depths, view->point_depth_count, sizeof *view->point_depths, compare_floats);
-    return (double)view->point_depths[(view->point_depth_count - 1) / 100];
+    float *depths = mem_alloc(view->seen_count, sizeof *depths, "depths", err);
+    if (depths == NULL)
+        return GBT_ERR_NO_MEMORY;
+    size_t count = 0;
+    for (size_t i = 0; i < view->seen_count; i++) {
+        double z = 0;
+        for (int k = 0; k < 3; k++)
+            z += view->camera.rotation[6 + k] *
+                 (raw->position[3 * (size_t)view->seen[i] + (size_t)k] - view->camera.center[k]);
+        if (z > 0)
+            depths[count++] = (float)z;
+    }
+    qsort(depths, count, sizeof *depths, compare_floats);
+    *depth = count > 0 ? (double)depths[(count - 1) / 100] : 0;
+    mem_free(depths);
+    return GBT_OK;
 }
 
 gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err)

@@ -19,9 +19,8 @@ typedef struct raw_view {
     gbt_camera camera; /* pose in world coordinates */
     uint32_t id;       /* COLMAP's image id, 0 elsewhere */
     size_t rank;       /* place in the sorted list, set by raw_sort_views(); stays when others are left out */
-    float *point_depths; /* [point_depth_count] of the sparse points that, by their tracks, are in the photo;
-                            > 0; owned */
-    size_t point_depth_count, point_depth_capacity;
+    uint32_t *seen;    /* [seen_count] the sparse points that are in the photo, by their tracks; owned */
+    size_t seen_count, seen_capacity;
 } raw_view;
 
 typedef struct raw_scene {
@@ -77,13 +76,13 @@ gbt_status raw_reserve_points(raw_scene *raw, size_t count, gbt_error *err);
 /** Append a point, or count it as dropped when a coordinate is not usable. There must be room. */
 void raw_add_point(raw_scene *raw, const double position[3], const float color[3]);
 
-/** A point at `position` is in the view's photo; one behind its camera, or not usable, is not. The pose must
-    be known. */
-gbt_status raw_add_point_depth(raw_view *view, const double position[3], gbt_error *err);
+/** The point that raw_add_point() is going to be given is in the photo of raw->views[view]. One that is
+   dropped is not. */
+gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3], gbt_error *err);
 
-/** How near the points in its photo come: the first percentile of their depths, for some are wrong. 0 without
-    any. Sorts them. */
-double raw_nearest_depth(raw_view *view);
+/** How near the points in its photo come: the first percentile of their depths, for some are wrong. 0 where
+   none is in front of the camera. */
+gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err);
 
 /** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. */
 gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err);

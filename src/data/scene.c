@@ -273,6 +273,19 @@ static gbt_status find_origin(const raw_scene *raw, double origin[3], gbt_error 
     return GBT_OK;
 }
 
+/* Every n-th sighting, so that no more than SCENE_SEEN_MAX remain, and the depth of the nearest. */
+static gbt_status keep_sightings(const raw_scene *raw, const raw_view *view, scene_view *out, gbt_error *err)
+{
+    const size_t stride = view->seen_count / SCENE_SEEN_MAX + 1;
+    GBT_TRY(raw_nearest_depth(raw, view, &out->nearest, err));
+    out->seen = mem_alloc(view->seen_count / stride + 1, sizeof *out->seen, "tracks", err);
+    if (out->seen == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < view->seen_count; i += stride)
+        out->seen[out->seen_count++] = view->seen[i];
+    return GBT_OK;
+}
+
 /* Move everything from `raw` to `out`, relative to out->origin. */
 static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
 {
@@ -301,15 +314,15 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
                                      .mask_path = view->mask_path,
                                      .camera = view->camera,
                                      .is_test = view->is_test,
-                                     .rank = view->rank,
-                                     .nearest = raw_nearest_depth(view)};
+                                     .rank = view->rank};
         view->name = NULL;
         view->path = NULL;
         view->mask_path = NULL;
         for (int k = 0; k < 3; k++)
             out->views[i].camera.center[k] -= out->origin[k];
+        out->view_count++;
+        GBT_TRY(keep_sightings(raw, view, &out->views[i], err));
     }
-    out->view_count = raw->view_count;
     out->points_dropped = raw->points_dropped;
     out->photos_missing = raw->photos_missing;
     out->file_bytes = raw->file_bytes;

@@ -35,7 +35,12 @@ typedef struct scene_view {
                   */
     double nearest; /* depth of the nearest sparse points in the photo, by their tracks (raw_nearest_depth());
                        0: it has none */
+    uint32_t *seen; /* [seen_count] sparse points in the photo, by their tracks, some where there are many;
+                       owned */
+    size_t seen_count;
 } scene_view;
+
+enum { SCENE_SEEN_MAX = 4000 };
 
 typedef struct scene_points {
     size_t count;
@@ -104,6 +109,7 @@ static inline void scene_view_free(scene_view *view)
     mem_free(view->name);
     mem_free(view->path);
     mem_free(view->mask_path);
+    mem_free(view->seen);
     *view = (scene_view){0};
 }
 

@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "train/camera_sees.h"
 
-enum { POINTS_ASKED = 4000, POINTS_MIN = 50 };
+enum { POINTS_ASKED = SCENE_SEEN_MAX, POINTS_MIN = 50 };
 static const float darkest = 0.04f, brightest = 0.96f; /* outside noise or clipping decides */
 
 static bool is_exposed(const float rgb[3])
@@ -40,13 +40,15 @@ static bool compare_at(const photos *p, size_t view, const gbt_camera *camera, s
 }
 
 /* The median over the points; false where too few say something. */
-static bool exposure_of(const photos *p, size_t view, float *room, double *stops)
+static bool exposure_of(const photos *p, size_t view, bool by_tracks, float *room, double *stops)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
-    const size_t points = p->source->points.count, stride = points / POINTS_ASKED + 1;
+    const scene_view *shown = &p->source->views[view];
+    const size_t points = p->source->points.count, stride = by_tracks ? 1 : points / POINTS_ASKED + 1,
+                 count = by_tracks ? shown->seen_count : points;
     size_t used = 0;
-    for (size_t i = 0; i < points; i += stride)
-        used += compare_at(p, view, &camera, i, &room[used]);
+    for (size_t i = 0; i < count; i += stride)
+        used += compare_at(p, view, &camera, by_tracks ? shown->seen[i] : i, &room[used]);
     if (used < POINTS_MIN)
         return false;
     qsort(room, used, sizeof *room, compare_floats);
@@ -54,25 +56,34 @@ static bool exposure_of(const photos *p, size_t view, float *room, double *stops
     return true;
 }
 
-gbt_status light_spread(const photos *p, const size_t *views, size_t count, double *stops, gbt_error *err)
+static double spread_over(const photos *p, const size_t *views, size_t count, bool by_tracks, float *room)
 {
-    *stops = 0;
-    if (!p->source->points.has_color)
-        return GBT_OK;
-    float *room = mem_alloc(POINTS_ASKED + 1, sizeof *room, "exposures", err);
-    if (room == NULL)
-        return GBT_ERR_NO_MEMORY;
     double sum = 0, squares = 0, known = 0;
     for (size_t i = 0; i < count; i++) {
         double exposure;
-        if (p->full[views[i]] == NULL || !exposure_of(p, views[i], room, &exposure))
+        if (p->full[views[i]] == NULL || !exposure_of(p, views[i], by_tracks, room, &exposure))
             continue;
         known++;
         sum += exposure;
         squares += exposure * exposure;
     }
+    return known < 2 ? 0 : sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
+}
+
+gbt_status light_differ(const photos *p, const size_t *views, size_t count, light_differences *out,
+                        gbt_error *err)
+{
+    *out = (light_differences){0};
+    if (!p->source->points.has_color)
+        return GBT_OK;
+    float *room = mem_alloc(POINTS_ASKED + 1, sizeof *room, "exposures", err);
+    if (room == NULL)
+        return GBT_ERR_NO_MEMORY;
+    bool tracks = false;
+    for (size_t i = 0; i < count; i++)
+        tracks = tracks || p->source->views[views[i]].seen_count > 0;
+    out->stops = spread_over(p, views, count, tracks, room);
+    out->many = out->stops > (tracks ? LIGHT_SPREAD_BY_TRACKS : LIGHT_SPREAD_WITHOUT);
     mem_free(room);
-    if (known >= 2)
-        *stops = sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
     return GBT_OK;
 }

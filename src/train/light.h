@@ -6,18 +6,27 @@
 
 #include "train/photos.h"
 
-/** From here on a run learns exposures by itself: stops. Photos of one exposure come to 0.05 to 0.19, mostly
-    by what hides points; the same times 0.5 to 2 to 0.6. */
-#define LIGHT_SPREAD_MIN 0.25
+/** From here on a run learns exposures by itself: stops. By tracks, photos of one exposure come to 0.001 (of
+   48 x 36 pixels to 0.03), and those of cameras that follow the light a little to 0.06. Without tracks photos
+   of one exposure come to 0.05 to 0.19, by what hides points. */
+#define LIGHT_SPREAD_BY_TRACKS 0.1
+#define LIGHT_SPREAD_WITHOUT 0.25
+
+/** How far apart the exposures of photos are. */
+typedef struct light_differences {
+    double stops; /* 0 where fewer than two photos show 50 points, or points have no colours */
+    bool many;    /* more than LIGHT_SPREAD_BY_TRACKS, or LIGHT_SPREAD_WITHOUT */
+} light_differences;
 
 /**
- * How far apart the exposures of photos are: the standard deviation over them of the median, over the sparse
- * points in view, of log2(photo / point). Points that others hide are among them; the median bears that.
+ * The standard deviation over photos of the median, over the sparse points in each, of log2(photo / point).
+ * These points are those whose tracks name the photo; where no tracks are known, all in view, some of them
+ * hidden.
  *
- * @param views [in]  [count]; of these, photos that are in memory
- * @param stops [out] 0 where fewer than two photos show 50 points, or points have no colours
+ * @param views [in] [count]; of these, photos that are in memory
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  */
-gbt_status light_spread(const photos *p, const size_t *views, size_t count, double *stops, gbt_error *err);
+gbt_status light_differ(const photos *p, const size_t *views, size_t count, light_differences *out,
+                        gbt_error *err);
 
 #endif

@@ -83,8 +83,11 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
         return GBT_OK;
     if (blind && points->count > 0)
         log_warn("%s: no training photo sees any of the %zu sparse points", t->scene.folder, points->count);
-    if (blind)
+    if (blind) {
         points->count = 0;
+        for (size_t i = 0; i < t->scene.view_count; i++)
+            t->scene.views[i].seen_count = 0;
+    }
     gbt_error why = {0};
     gbt_status status =
         seed_points_make(&t->photos, t->train_views, t->train_count, t->def.seed, &made, &why);
@@ -261,16 +264,16 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
 /* Photos that differ in exposure contradict each other wherever they overlap. */
 static gbt_status choose_exposure(trainer *t, gbt_error *err)
 {
-    double stops;
+    light_differences differences;
     if (t->def.exposure || !t->def.find_exposure || !t->rules.finds_exposure)
         return GBT_OK;
-    GBT_TRY(light_spread(&t->photos, t->train_views, t->train_count, &stops, err));
-    t->def.exposure = stops > LIGHT_SPREAD_MIN;
+    GBT_TRY(light_differ(&t->photos, t->train_views, t->train_count, &differences, err));
+    t->def.exposure = differences.many;
     if (t->def.exposure)
         log_info(
             "%s: the photos' exposures differ by about %.2g stops: a colour matrix is learned for each, as "
             "with exposure (turned off by find_exposure)",
-            t->scene.folder, stops);
+            t->scene.folder, differences.stops);
     return GBT_OK;
 }
 

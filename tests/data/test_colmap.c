@@ -105,8 +105,10 @@ static void good_model(void **state)
     /* The track of the first point, (1, 1.25, 1.5), names both images; the third row of that rotation is (0,
        1, 0), the translation 3. */
     for (int i = 0; i < 2; i++)
-        assert_int_equal(raw.views[i].point_depth_count, 1);
-    assert_true(fabs(raw_nearest_depth(&raw.views[0]) - 4.25) < 1e-6);
+        assert_true(raw.views[i].seen_count == 1 && raw.views[i].seen[0] == 0);
+    double nearest;
+    assert_int_equal(raw_nearest_depth(&raw, &raw.views[0], &nearest, NULL), GBT_OK);
+    assert_true(fabs(nearest - 4.25) < 1e-6);
     raw_free(&raw);
     free_seed(seed);
 }
@@ -115,17 +117,31 @@ static void good_model(void **state)
 static void nearest_in_a_photo(void **state)
 {
     (void)state;
-    raw_view view = {.camera = {.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, 1}}};
-    assert_true(raw_nearest_depth(&view) == 0);
-    for (int i = 201; i >= 1; i--)
-        assert_int_equal(raw_add_point_depth(&view, (const double[3]){7, -7, 1 + i}, NULL), GBT_OK);
-    static const double out_of_view[] = {1, -5, NAN, INFINITY, 1e13};
-    for (int i = 0; i < 5; i++)
-        assert_int_equal(raw_add_point_depth(&view, (const double[3]){0, 0, out_of_view[i]}, NULL), GBT_OK);
-    assert_int_equal(view.point_depth_count, 201);
-    assert_true(raw_nearest_depth(&view) == 3);
-    raw_view_free(&view);
-    assert_true(raw_nearest_depth(&view) == 0);
+    enum { IN_FRONT = 201, ELSEWHERE = 5 };
+    static const double out_of_view[ELSEWHERE] = {1, -5, NAN, INFINITY, 1e13};
+    static const float grey[3] = {0.5f, 0.5f, 0.5f};
+    raw_scene raw = {0};
+    raw_view *view = raw_next_view(&raw, NULL);
+    view->camera = (gbt_camera){.rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .center = {0, 0, 1}};
+    raw.view_count = 1;
+    double nearest;
+    assert_int_equal(raw_nearest_depth(&raw, view, &nearest, NULL), GBT_OK);
+    assert_true(nearest == 0);
+    assert_int_equal(raw_reserve_points(&raw, IN_FRONT + ELSEWHERE, NULL), GBT_OK);
+    for (int i = 0; i < IN_FRONT + ELSEWHERE; i++) {
+        const bool far = i >= IN_FRONT;
+        const double position[3] = {far ? 0 : 7, far ? 0 : -7,
+                                    far ? out_of_view[i - IN_FRONT] : IN_FRONT + 1 - i};
+        assert_int_equal(raw_add_sighting(&raw, 0, position, NULL), GBT_OK);
+        raw_add_point(&raw, position, grey);
+    }
+    assert_int_equal(raw.points_dropped, 3);
+    assert_int_equal(view->seen_count, IN_FRONT + ELSEWHERE - 3);
+    for (size_t i = 0; i < view->seen_count; i++)
+        assert_int_equal(view->seen[i], i);
+    assert_int_equal(raw_nearest_depth(&raw, view, &nearest, NULL), GBT_OK);
+    assert_true(nearest == 3);
+    raw_free(&raw);
 }
 
 /* The cursor itself, at its exact ends: one byte past them reads as 0 and is noticed, and nothing moves. */

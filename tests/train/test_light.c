@@ -30,29 +30,37 @@ static const char *exposed_scene(const char *name, double stops)
     return folder;
 }
 
-static double spread_of(const trainer *t)
+static light_differences differences_of(const trainer *t)
 {
-    double stops;
-    assert_ok(light_spread(&t->photos, t->train_views, t->train_count, &stops, NULL));
-    return stops;
+    light_differences out;
+    assert_ok(light_differ(&t->photos, t->train_views, t->train_count, &out, NULL));
+    return out;
 }
 
+/* By tracks, a fifth of a stop is enough; without, what hides points could be it. */
 static void exposures_are_found(void **state)
 {
     (void)state;
     static const struct {
         double stops;
-        bool found;
-    } cases[] = {{0, false}, {0.1, false}, {1, true}};
+        bool by_tracks, without;
+    } cases[] = {{0, false, false}, {0.1, false, false}, {0.25, true, false}, {1, true, true}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         trainer t;
         const gbt_train_def def = run_def();
         open_ok(&t, exposed_scene("light", cases[i].stops), &def);
-        print_message("photos of -%g to %g stops: spread %.3f\n", cases[i].stops, cases[i].stops,
-                      spread_of(&t));
-        assert_int_equal(spread_of(&t) > LIGHT_SPREAD_MIN, cases[i].found);
-        assert_int_equal(t.def.exposure, cases[i].found);
-        assert_int_equal(t.exposures.count > 0, cases[i].found);
+        const light_differences by_tracks = differences_of(&t);
+        for (size_t v = 0; v < t.scene.view_count; v++) {
+            assert_true(t.scene.views[v].seen_count > 0);
+            t.scene.views[v].seen_count = 0;
+        }
+        const light_differences without = differences_of(&t);
+        print_message("photos of -%g to %g stops: %.3f by tracks, %.3f without\n", cases[i].stops,
+                      cases[i].stops, by_tracks.stops, without.stops);
+        assert_int_equal(by_tracks.many, cases[i].by_tracks);
+        assert_int_equal(without.many, cases[i].without);
+        assert_int_equal(t.def.exposure, cases[i].by_tracks);
+        assert_int_equal(t.exposures.count > 0, cases[i].by_tracks);
         trainer_free(&t);
     }
 }

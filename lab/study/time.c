@@ -19,6 +19,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     def.downscale = s->def.downscale;
     def.seed = (uint64_t)seed;
     def.save_every_seconds = 0;
+    def.find_exposure = false; /* the faithful protocol has none, and scores must be of the same pixels */
     def.command = "gbtrace study time";
     def.budget_seconds = v->budgets * s->def.budget_seconds;
     for (int i = 0; i < TIME_MARKS; i++)

@@ -63,7 +63,7 @@ typedef struct gbt_train_def {
     bool exposure; /* learn a colour matrix per photo; held-out photos are then scored on their right half,
                       with a matrix fitted to the left */
     bool find_exposure;  /* turn `exposure` on where the photos' exposures differ by a standard deviation of
-                            more  than 0.1 stops, or 0.25 where points have no tracks. Not with compat */
+                            more than 0.1 stops, or 0.25 where points have no tracks. Not with compat */
     bool refine_poses;   /* learn the poses of the training photos, too, from where the data set has them;
                             held-out photos are then scored from the poses at which the scene fits them
                             best */

@@ -123,7 +123,7 @@ gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double 
         for (int k = 0; k < 3; k++)
             z += view->camera.rotation[6 + k] *
                  (raw->position[3 * (size_t)view->seen[i] + (size_t)k] - view->camera.center[k]);
-        if (z > 0)
+        if (z > 0 && z <= RAW_COORDINATE_LIMIT)
             depths[count++] = (float)z;
     }
     qsort(depths, count, sizeof *depths, compare_floats);

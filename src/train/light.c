@@ -83,7 +83,7 @@ gbt_status light_differ(const photos *p, const size_t *views, size_t count, ligh
     for (size_t i = 0; i < count; i++)
         tracks = tracks || p->source->views[views[i]].seen_count > 0;
     out->stops = spread_over(p, views, count, tracks, room);
-    out->many = out->stops > (tracks ? LIGHT_SPREAD_BY_TRACKS : LIGHT_SPREAD_WITHOUT);
+    out->large = out->stops > (tracks ? LIGHT_SPREAD_BY_TRACKS : LIGHT_SPREAD_WITHOUT);
     mem_free(room);
     return GBT_OK;
 }

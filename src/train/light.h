@@ -15,7 +15,7 @@
 /** How far apart the exposures of photos are. */
 typedef struct light_differences {
     double stops; /* 0 where fewer than two photos show 50 points, or points have no colours */
-    bool many;    /* more than LIGHT_SPREAD_BY_TRACKS, or LIGHT_SPREAD_WITHOUT */
+    bool large;   /* more than LIGHT_SPREAD_BY_TRACKS, or LIGHT_SPREAD_WITHOUT */
 } light_differences;
 
 /**

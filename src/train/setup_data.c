@@ -157,7 +157,7 @@ static gbt_status choose_exposure(trainer *t, gbt_error *err)
     if (t->def.exposure || !t->def.find_exposure || !t->rules.finds_exposure)
         return GBT_OK;
     GBT_TRY(light_differ(&t->photos, t->train_views, t->train_count, &differences, err));
-    t->def.exposure = differences.many;
+    t->def.exposure = differences.large;
     if (t->def.exposure)
         log_info(
             "%s: the photos' exposures differ by about %.2g stops: a colour matrix is learned for each, as "

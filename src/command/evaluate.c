@@ -38,8 +38,8 @@ static void log_scores(const evaluation *e)
         log_info("no held-out views: scores are n/a");
         return;
     }
-    log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s", e->view_count, e->psnr, e->ssim,
-             e->flip, more);
+    log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s%s", e->view_count, e->psnr, e->ssim,
+             e->flip, more, e->exposure ? ", of their right halves" : "");
     if (!e->exposure && e->psnr_fitted > e->psnr + EXPOSURE_HINT)
         log_info(
             "held-out photos differ in exposure from the scene: PSNR is %.2f dB with their colours fitted "

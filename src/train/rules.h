@@ -50,10 +50,11 @@ typedef struct train_rules {
     double splats_until;   /* part of the run in which splats stand for rays */
     bool loose_rays;       /* SCHEDULE_ALPHA_MIN, SCHEDULE_T_MIN and one order for each packet of rays until
                               SCHEDULE_EXACT_FROM */
-    bool raises_first_opacity;        /* of offsets that begin below 0 */
-    bool own_rates;                   /* higher learning rates, that fall to nothing in the end */
-    double geometry_from;             /* progress from which offsets and scales learn, and anchors may grow
-                                         and be pruned */
+    double raises_until;   /* progress until which the opacities of an offset that is below 0 in the
+                              mean are raised */
+    bool own_rates;        /* higher learning rates, that fall to nothing in the end */
+    double geometry_from;  /* progress from which offsets and scales learn, and anchors may grow
+                              and be pruned */
     bool anchors_learn_when_adjusted; /* else they miss the step in which anchors change */
 
     /* growing and pruning */

@@ -55,21 +55,21 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
     return GBT_OK;
 }
 
-/* After the render: is the scene empty, and for good? And in the first step: is one offset of all anchors?
-   The networks begin at random, and an offset that begins below 0 everywhere would hardly ever be used. What
-   the step's first view saw decides. */
-static void raise_opacities_when_empty(trainer *t, const step_report *r)
+/* After the render: is the scene empty, and for good? And until anchors grow: is one offset of most anchors?
+   The networks begin at random, and while colours are wrong their opacities fall, all together: what is below
+   0 everywhere hardly ever comes back. What the step's first view saw decides. */
+static void raise_opacities(trainer *t, const step_report *r, double progress)
 {
-    const bool first = t->step == 0 && t->rules.raises_first_opacity,
-               empty = r->visible > 0 && r->gaussians == 0;
+    const bool early = progress < t->rules.raises_until;
+    const bool empty = r->visible > 0 && r->gaussians == 0;
     t->empty_in_row = empty ? t->empty_in_row + 1 : 0;
     const bool lasts = t->empty_in_row >= EMPTY_STEPS;
     const decode_tape *tape = &t->views[0].frame.tape;
-    if (first && cluster_leads())
+    if (early && cluster_leads())
         decode_raise_opacity(tape, 0, raised_opacity, &t->decoder);
     if (lasts && cluster_leads())
         decode_raise_opacity(tape, raised_opacity, raised_opacity, &t->decoder);
-    if (first || lasts)
+    if (early || lasts)
         cluster_broadcast(t->decoder.params, t->decoder.param_count * sizeof *t->decoder.params);
     if (!lasts)
         return;
@@ -200,7 +200,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));
     report_views(t, out);
-    raise_opacities_when_empty(t, out);
+    raise_opacities(t, out, progress);
     for (int i = 0; i < t->def.views; i++)
         if (t->outcomes[i].bad)
             return skip_step(t, out, t->outcomes[i].text, err);

@@ -102,8 +102,8 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  *
  * Gaussians below opacity 0 have no gradient, so a scene that has lost all of them (or begins without: the
  * first networks are random) would stay empty. After five steps in a row with visible anchors and not one
- * Gaussian, opacities are raised to 0.1; in the first step (raises_first_opacity) those of each offset whose
- * mean is below 0.
+ * Gaussian, opacities are raised to 0.1; until anchors grow (rules.raises_until) in each step those of an
+ * offset whose mean is below 0.
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 

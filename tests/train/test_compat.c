@@ -160,7 +160,7 @@ static void the_other_rules_are_the_references(void **state)
     open_ok(&t, tiny, &def);
     const train_rules *r = &t.rules;
     assert_true(t.def.offsets == 10 && t.def.scale_factor == 1 && t.def.footprint == 0);
-    assert_true(!r->features_from_colors && !r->raises_first_opacity && !r->limits_first_scale);
+    assert_true(!r->features_from_colors && r->raises_until == 0 && !r->limits_first_scale);
     for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
         assert_true(t.anchors.feature[i] == 0);
     assert_int_equal(r->voxel, GBT_VOXEL_RULE_SQUARED);
@@ -189,7 +189,7 @@ static void faint_gaussians_count(void **state)
         memset(t.decoder.params + p->begin, 0, (p->end - p->begin) * sizeof(float));
         for (int k = 0; k < t.def.offsets; k++)
             t.decoder.params[p->end - 1 - (size_t)k] = 0.002f; /* below 1/255 */
-        t.rules.raises_first_opacity = false;
+        t.rules.raises_until = 0;
         for (size_t i = 0; i < t.anchors.count; i++)
             for (size_t c = 3; c < 6; c++)
                 t.anchors.scale_log[6 * i + c] = 0;

@@ -15,6 +15,7 @@
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/gradient_check.h"
+#include "train/schedule.h"
 
 /* A path that lives for the next few calls. */
 static const char *joined(const char *folder, const char *name)
@@ -492,6 +493,7 @@ static void an_empty_scene_comes_back(void **state)
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);
+        t.rules.raises_until = 0;
         decoder_part parts[3];
         decoder_parts(&t.decoder, parts);
         step_ok(&t, &r);
@@ -510,17 +512,29 @@ static void an_empty_scene_comes_back(void **state)
     }
 }
 
-/* An offset that begins below 0 for every anchor is raised in the first step; with --compat it stays as the
-   reference has it. */
-static void no_offset_is_born_dead(void **state)
+/* An offset that is below 0 for every anchor, at the start or some steps later, is raised until anchors grow;
+   not after, and with --compat it stays as the reference has it. */
+static void no_offset_dies_at_the_start(void **state)
 {
     (void)state;
-    for (int compat = 0; compat <= 1; compat++) {
+    static const struct {
+        bool compat;
+        int before; /* steps */
+        double until;
+        bool raised;
+    } cases[] = {{false, 0, 0.1, true}, {false, 3, 0.1, true}, {false, 3, 0.02, false}, {true, 0, 0, false}};
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         gbt_train_def def = run_def();
-        def.compat = compat == 1;
+        def.compat = cases[n].compat;
+        def.iterations = 100;
+        def.grow = false;
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);
+        assert_true(t.rules.raises_until == (def.compat ? 0 : SCHEDULE_ADJUST_FROM));
+        t.rules.raises_until = cases[n].until;
+        for (int i = 0; i < cases[n].before; i++)
+            step_ok(&t, &r);
         decoder_part parts[3];
         decoder_parts(&t.decoder, parts);
         const size_t k_count = (size_t)t.decoder.offset_count;
@@ -532,7 +546,7 @@ static void no_offset_is_born_dead(void **state)
                 count[step] += t.views[0].frame.tape.slot[i] % k_count == 0;
         }
         assert_int_equal(count[0], 0);
-        assert_true(compat ? count[1] == 0 : count[1] > t.views[0].frame.visible_count / 2);
+        assert_true(cases[n].raised ? count[1] > t.views[0].frame.visible_count / 2 : count[1] == 0);
         trainer_free(&t);
     }
 }
@@ -739,7 +753,7 @@ int main(void)
         cmocka_unit_test(ten_bad_steps_end_the_run),
         cmocka_unit_test(scales_stay_in_their_range),
         cmocka_unit_test(an_empty_scene_comes_back),
-        cmocka_unit_test(no_offset_is_born_dead),
+        cmocka_unit_test(no_offset_dies_at_the_start),
         cmocka_unit_test(nothing_is_nearer_than_photos_show),
         cmocka_unit_test(opacities_are_raised),
         cmocka_unit_test(points_that_tell_nothing_are_replaced),

@@ -64,13 +64,12 @@ static void raise_opacities(trainer *t, const step_report *r, double progress)
     const bool empty = r->visible > 0 && r->gaussians == 0;
     t->empty_in_row = empty ? t->empty_in_row + 1 : 0;
     const bool lasts = t->empty_in_row >= EMPTY_STEPS;
-    const decode_tape *tape = &t->views[0].frame.tape;
-    if (early && cluster_leads())
-        decode_raise_opacity(tape, 0, raised_opacity, &t->decoder);
-    if (lasts && cluster_leads())
-        decode_raise_opacity(tape, raised_opacity, raised_opacity, &t->decoder);
-    if (early || lasts)
-        cluster_broadcast(t->decoder.params, t->decoder.param_count * sizeof *t->decoder.params);
+    if (!early && !lasts)
+        return;
+    if (cluster_leads())
+        decode_raise_opacity(&t->views[0].frame.tape, lasts ? raised_opacity : 0, raised_opacity,
+                             &t->decoder);
+    cluster_broadcast(t->decoder.params, t->decoder.param_count * sizeof *t->decoder.params);
     if (!lasts)
         return;
     decoder_part parts[DECODER_PARTS];

@@ -199,11 +199,11 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));
     report_views(t, out);
-    raise_opacities(t, out, progress);
     for (int i = 0; i < t->def.views; i++)
         if (t->outcomes[i].bad)
             return skip_step(t, out, t->outcomes[i].text, err);
     t->skipped_in_row = 0;
+    raise_opacities(t, out, progress);
 
     /* One gradient, then parameters. */
     stage_clock clock = stage_begin();

@@ -12,7 +12,7 @@
 #include "data/photo_check.h"
 #include "train/camera_sees.h"
 #include "train/checkpoint.h"
-#include "train/light.h"
+#include "train/exposure_spread.h"
 #include "train/memory_need.h"
 #include "train/seed_points.h"
 
@@ -153,16 +153,16 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
 /* Photos that differ in exposure contradict each other wherever they overlap. */
 static gbt_status choose_exposure(trainer *t, gbt_error *err)
 {
-    light_differences differences;
+    exposure_spread spread;
     if (t->def.exposure || !t->def.find_exposure || !t->rules.finds_exposure)
         return GBT_OK;
-    GBT_TRY(light_differ(&t->photos, t->train_views, t->train_count, &differences, err));
-    t->def.exposure = differences.large;
+    GBT_TRY(exposure_spread_find(&t->photos, t->train_views, t->train_count, &spread, err));
+    t->def.exposure = spread.large;
     if (t->def.exposure)
         log_info(
             "%s: the photos' exposures differ by about %.2g stops: a colour matrix is learned for each, as "
             "with exposure (turned off by find_exposure)",
-            t->scene.folder, differences.stops);
+            t->scene.folder, spread.stops);
     return GBT_OK;
 }
 

@@ -1,13 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_light.c -- what a run finds out about its photos before it begins: do exposures differ,
-   and how near are things. */
+/* tests/train/test_exposure_spread.c -- do photos differ in exposure? */
 #include "run_support.h"
 
-#include "train/light.h"
-#include "train/camera_sees.h"
-#include "train/near.h"
-
-/* ---- exposure ---- */
+#include "train/exposure_spread.h"
 
 /* The photos of a scene of its own, each times 2^(stops * something in [-1, 1]). */
 static const char *exposed_scene(const char *name, double stops)
@@ -30,10 +25,10 @@ static const char *exposed_scene(const char *name, double stops)
     return folder;
 }
 
-static light_differences differences_of(const trainer *t)
+static exposure_spread differences_of(const trainer *t)
 {
-    light_differences out;
-    assert_ok(light_differ(&t->photos, t->train_views, t->train_count, &out, NULL));
+    exposure_spread out;
+    assert_ok(exposure_spread_find(&t->photos, t->train_views, t->train_count, &out, NULL));
     return out;
 }
 
@@ -49,12 +44,12 @@ static void exposures_are_found(void **state)
         trainer t;
         const gbt_train_def def = run_def();
         open_ok(&t, exposed_scene("light", cases[i].stops), &def);
-        const light_differences by_tracks = differences_of(&t);
+        const exposure_spread by_tracks = differences_of(&t);
         for (size_t v = 0; v < t.scene.view_count; v++) {
             assert_true(t.scene.views[v].seen_count > 0);
             t.scene.views[v].seen_count = 0;
         }
-        const light_differences without = differences_of(&t);
+        const exposure_spread without = differences_of(&t);
         print_message("photos of -%g to %g stops: %.3f by tracks, %.3f without\n", cases[i].stops,
                       cases[i].stops, by_tracks.stops, without.stops);
         assert_int_equal(by_tracks.large, cases[i].by_tracks);
@@ -79,44 +74,11 @@ static void found_exposures_can_be_left(void **state)
     }
 }
 
-/* ---- near ---- */
-
-/* One close-up among many photos has its own near distance, and the others keep theirs. */
-static void a_close_up_is_alone(void **state)
-{
-    (void)state;
-    enum { COUNT = 40 };
-    scene_view views[COUNT] = {{0}};
-    size_t all[COUNT];
-    for (size_t i = 0; i < COUNT; i++) {
-        views[i].nearest = 4 + 0.01 * (double)i;
-        all[i] = i;
-    }
-    views[17].nearest = 0.2;
-    views[3].nearest = 0; /* unknown */
-    const scene s = {.views = views, .view_count = COUNT};
-    gbt_train_def def = gbt_train_def_default(), reference = def;
-    def.near = 0.5;
-    reference.compat = true;
-    float near;
-    assert_ok(scene_near(&s, all, COUNT, 0.5, &near, NULL));
-    assert_true(near >= 2 && near < 2.1f);
-    assert_true(view_near(near, &def, &views[17]) == 0.1f && view_near(near, &def, &views[3]) == near);
-    for (size_t i = 5; i < COUNT; i++)
-        assert_true(i == 17 || view_near(near, &def, &views[i]) > 1.9f);
-    assert_true(view_near(0.3f, &reference, &views[17]) == 0.3f); /* nothing is asked of the points */
-    assert_ok(scene_near(&s, all, 10, 0.5, &near, NULL));         /* of few photos, the least */
-    assert_true(near == 2);
-    assert_ok(scene_near(&s, all + 3, 1, 0.5, &near, NULL));
-    assert_true(near == 0);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exposures_are_found),
         cmocka_unit_test(found_exposures_can_be_left),
-        cmocka_unit_test(a_close_up_is_alone),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/light.c -- the exposures of photos, by the colours of sparse points in them. */
-#include "train/light.h"
+/* train/exposure_spread.c -- the exposures of photos, by the colours of sparse points in them. */
+#include "train/exposure_spread.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -70,10 +70,10 @@ static double spread_over(const photos *p, const size_t *views, size_t count, bo
     return known < 2 ? 0 : sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
 }
 
-gbt_status light_differ(const photos *p, const size_t *views, size_t count, light_differences *out,
-                        gbt_error *err)
+gbt_status exposure_spread_find(const photos *p, const size_t *views, size_t count, exposure_spread *out,
+                                gbt_error *err)
 {
-    *out = (light_differences){0};
+    *out = (exposure_spread){0};
     if (!p->source->points.has_color)
         return GBT_OK;
     float *room = mem_alloc(POINTS_ASKED + 1, sizeof *room, "exposures", err);
@@ -83,7 +83,7 @@ gbt_status light_differ(const photos *p, const size_t *views, size_t count, ligh
     for (size_t i = 0; i < count; i++)
         tracks = tracks || p->source->views[views[i]].seen_count > 0;
     out->stops = spread_over(p, views, count, tracks, room);
-    out->large = out->stops > (tracks ? LIGHT_SPREAD_BY_TRACKS : LIGHT_SPREAD_WITHOUT);
+    out->large = out->stops > (tracks ? EXPOSURE_SPREAD_BY_TRACKS : EXPOSURE_SPREAD_WITHOUT);
     mem_free(room);
     return GBT_OK;
 }

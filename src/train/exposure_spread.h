@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/light.h -- do photos differ in exposure? Asked of the sparse points, whose colours are known before
-   anything is trained. */
-#ifndef GBT_TRAIN_LIGHT_H
-#define GBT_TRAIN_LIGHT_H
+/* train/exposure_spread.h -- do photos differ in exposure? Asked of the sparse points, whose colours are
+   known before anything is trained. */
+#ifndef GBT_TRAIN_EXPOSURE_SPREAD_H
+#define GBT_TRAIN_EXPOSURE_SPREAD_H
 
 #include "train/photos.h"
 
 /** From here on a run learns exposures by itself: stops. By tracks, photos of one exposure come to 0.001 (of
    48 x 36 pixels to 0.03), and those of cameras that follow the light a little to 0.06. Without tracks photos
    of one exposure come to 0.05 to 0.19, by what hides points. */
-#define LIGHT_SPREAD_BY_TRACKS 0.1
-#define LIGHT_SPREAD_WITHOUT 0.25
+#define EXPOSURE_SPREAD_BY_TRACKS 0.1
+#define EXPOSURE_SPREAD_WITHOUT 0.25
 
 /** How far apart the exposures of photos are. */
-typedef struct light_differences {
+typedef struct exposure_spread {
     double stops; /* 0 where fewer than two photos show 50 points, or points have no colours */
-    bool large;   /* more than LIGHT_SPREAD_BY_TRACKS, or LIGHT_SPREAD_WITHOUT */
-} light_differences;
+    bool large;   /* more than EXPOSURE_SPREAD_BY_TRACKS, or EXPOSURE_SPREAD_WITHOUT */
+} exposure_spread;
 
 /**
  * The standard deviation over photos of the median, over the sparse points in each, of log2(photo / point).
@@ -26,7 +26,7 @@ typedef struct light_differences {
  * @param views [in] [count]; of these, photos that are in memory
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  */
-gbt_status light_differ(const photos *p, const size_t *views, size_t count, light_differences *out,
-                        gbt_error *err);
+gbt_status exposure_spread_find(const photos *p, const size_t *views, size_t count, exposure_spread *out,
+                                gbt_error *err);
 
 #endif

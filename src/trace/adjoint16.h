@@ -318,12 +318,13 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     return true;
 }
 
-/* The hits of one ray, in order: no windows, and no division. */
+/* The hits of one ray, in order: no windows, and no division. What each hit waits for from the one before is
+   one operation; the rest is done for sixteen. */
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
                         gradient_list *out, float d_background[3], kernel_scratch *scratch)
 {
-    enum { RAW, V, COLOR = V + 3, OPACITY, T, D_ALPHA, FIELDS };
+    enum { RAW, V, COLOR = V + 3, OPACITY, CLEAR, TERM, T, BEHIND, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, FIELDS * n, sizeof(float),
                     "adjoint of a ray", NULL) != GBT_OK)
@@ -331,7 +332,7 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     float *field[FIELDS];
     for (int f = 0; f < FIELDS; f++)
         field[f] = scratch->rows + (size_t)f * n;
-    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near),
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), one = vfloat16_set1(1),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max);
     ray_lanes ray;
     vfloat16 d_rgb[3];
@@ -345,39 +346,60 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         const gaussian_lanes g = entry_gaussians(scene, entry, first, count, color);
         response r = respond(&g, &ray, t_near);
         refine_point(&g, &ray, t_near, &r);
-        vfloat16_store(field[RAW] + first, response_alpha(&g, r.d2));
+        const vfloat16 raw = response_alpha(&g, r.d2), alpha = vfloat16_min(raw, alpha_max),
+                       shown = dot16(color, d_rgb);
+        vfloat16_store(field[RAW] + first, raw);
         for (int k = 0; k < 3; k++)
             vfloat16_store(field[V + k] + first, r.v[k]);
-        vfloat16_store(field[COLOR] + first, dot16(color, d_rgb));
+        vfloat16_store(field[COLOR] + first, shown);
         vfloat16_store(field[OPACITY] + first, g.opacity);
+        vfloat16_store(field[CLEAR] + first, vfloat16_sub(one, alpha));
+        vfloat16_store(field[TERM] + first, vfloat16_mul(alpha, shown));
     }
-    float transmittance = 1;
+    const float *clear = field[CLEAR], *term = field[TERM];
+    float *T_before = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
     for (int i = 0; i < count; i++) {
-        field[T][i] = transmittance;
-        transmittance *= 1 - smaller(field[RAW][i], scene->settings.alpha_max);
+        T_before[i] = transmittance;
+        transmittance *= clear[i];
     }
-    float behind = 0;
     for (int c = 0; c < 3; c++) {
         behind = fmaf(rays->background[c][lane], d_rgb_in[c][lane], behind);
         d_background[c] += transmittance * d_rgb_in[c][lane];
     }
     for (int i = count; i-- > 0;) {
-        const float difference = field[COLOR][i] - behind;
-        field[D_ALPHA][i] = field[T][i] * difference;
-        behind = fmaf(smaller(field[RAW][i], scene->settings.alpha_max), difference, behind);
+        behind_hit[i] = behind;
+        behind = fmaf(clear[i], behind, term[i]);
     }
     for (int first = 0; first < count; first += 16) {
         vfloat16 v[3], terms[16];
         for (int k = 0; k < 3; k++)
             v[k] = vfloat16_load(field[V + k] + first);
-        const vfloat16 raw = vfloat16_load(field[RAW] + first),
-                       weight = vfloat16_mul(vfloat16_load(field[T] + first), vfloat16_min(raw, alpha_max));
-        gradient_terms(vfloat16_load(field[D_ALPHA] + first), raw, weight, v,
-                       vfloat16_load(field[OPACITY] + first), alpha_max, d_rgb, terms);
+        const vfloat16 raw = vfloat16_load(field[RAW] + first), before = vfloat16_load(field[T] + first),
+                       weight = vfloat16_mul(before, vfloat16_min(raw, alpha_max)),
+                       d_alpha = vfloat16_mul(before, vfloat16_sub(vfloat16_load(field[COLOR] + first),
+                                                                   vfloat16_load(field[BEHIND] + first)));
+        gradient_terms(d_alpha, raw, weight, v, vfloat16_load(field[OPACITY] + first), alpha_max, d_rgb,
+                       terms);
         if (!add_turned(entry + first, count - first, terms, out))
             return false;
     }
     return true;
+}
+
+/* How many entries there are, and of each packet alone; `singles`: bit per packet whose rays went one by one.
+   A function of its own, so that the counters are in registers. */
+static __attribute__((noinline)) size_t count_entries(const tape_entry *entry, size_t of_packet[TILE_PACKETS],
+                                                      unsigned *singles)
+{
+    size_t count = 0;
+    unsigned seen = 0;
+    for (; entry[count].packet != TAPE_END; count++)
+        if (entry[count].packet & TAPE_SINGLE)
+            seen |= 1u << (entry[count].packet & ~TAPE_SINGLE);
+        else
+            of_packet[entry[count].packet]++;
+    *singles = seen;
+    return count;
 }
 
 static bool backward(const kernel_scene *scene, const tile_rays *tile,
@@ -385,13 +407,9 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile,
                      float d_background[3], kernel_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
-    size_t count = 0, of_packet[TILE_PACKETS] = {0};
-    unsigned singles = 0;
-    for (; entry[count].packet != TAPE_END; count++)
-        if (entry[count].packet & TAPE_SINGLE)
-            singles |= 1u << (entry[count].packet & ~TAPE_SINGLE);
-        else
-            of_packet[entry[count].packet]++;
+    size_t of_packet[TILE_PACKETS] = {0};
+    unsigned singles;
+    const size_t count = count_entries(entry, of_packet, &singles);
     if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, count * sizeof(tape_entry), 1, "adjoint entries",
                     NULL) != GBT_OK)
         return false;

@@ -29,7 +29,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .step_pixels = TRAIN_STEP_PIXELS,
         .splats_until = def->splats_until,
         .loose_rays = true,
-        .raises_until = SCHEDULE_ADJUST_FROM,
+        .raises_until = def->refine_poses ? SCHEDULE_POSES_SETTLED : SCHEDULE_ADJUST_FROM,
         .last_step_learns = true,
         .own_rates = true,
         .geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0,

@@ -19,7 +19,7 @@
 #include "train/step_size.h"
 #include "train/trainer.h"
 
-enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, STREAM_PARTS = 6 };
+enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, STREAM_PARTS = 6, STREAM_BACKGROUND = 8 };
 
 /* ---- which photo ---- */
 
@@ -82,6 +82,18 @@ static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot, u
     return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
 }
 
+/* Late in a run another colour in each step: only what hides it is right on all of them. */
+static void pick_background(const trainer *t, uint64_t before, float out[3])
+{
+    uint32_t words[4];
+    memcpy(out, t->settings.background, sizeof t->settings.background);
+    if (pace_progress(&t->pace, t->step) < t->rules.opaque_from)
+        return;
+    rng_philox(t->def.seed, STREAM_BACKGROUND, before, words);
+    for (int c = 0; c < 3; c++)
+        out[c] = (float)(words[c] >> 8) * 0x1p-24f;
+}
+
 void step_photos_pick(trainer *t)
 {
     for (int i = 0; i < t->def.views; i++)
@@ -97,6 +109,7 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     const photo_sample sample = pick_pixels(t, size, v->slot, before);
     GBT_TRY(photos_get_sample(&t->photos, view, &sample, &v->photo, &v->camera, &v->valid,
                               &v->frame.draw.pixel_step, err));
+    pick_background(t, before, v->background);
     v->outcome.width = v->camera.width;
     v->outcome.height = v->camera.height;
     if (v->valid == NULL || t->view_count == 1)
@@ -150,6 +163,7 @@ static trace_settings settings_of(const trainer *t, const step_view *v, double p
 {
     trace_settings settings = t->settings;
     settings.t_near = step_view_near(t, v);
+    memcpy(settings.background, v->background, sizeof settings.background);
     if (is_loose(t, progress)) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;

@@ -31,12 +31,15 @@ static inline void rng_philox(uint64_t seed, uint64_t stream, uint64_t index, ui
     out[3] = c3;
 }
 
+/** A word as a number in [0, 1), 24 bits. */
+static inline float rng_unit(uint32_t word) { return (float)(word >> 8) * 0x1p-24f; }
+
 /** Uniform in [0, 1), 24 bits. */
 static inline float rng_uniform(uint64_t seed, uint64_t stream, uint64_t index)
 {
     uint32_t words[4];
     rng_philox(seed, stream, index, words);
-    return (float)(words[0] >> 8) * 0x1p-24f;
+    return rng_unit(words[0]);
 }
 
 /** Standard normal (Box 1958). */

@@ -9,6 +9,7 @@
 
 static train_rules own_rules(const gbt_train_def *def)
 {
+    const double geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0;
     return (train_rules){
         .offsets = 2,           /* fewer than in the paper's base: at equal time the models are better */
         .ball_scale_factor = 2, /* the balls' scale prior is smaller than their spacing */
@@ -29,11 +30,11 @@ static train_rules own_rules(const gbt_train_def *def)
         .step_pixels = TRAIN_STEP_PIXELS,
         .splats_until = def->splats_until,
         .loose_rays = true,
-        .raises_until = def->refine_poses ? SCHEDULE_POSES_SETTLED : SCHEDULE_ADJUST_FROM,
+        .raises_until = fmax(SCHEDULE_ADJUST_FROM, geometry_from), /* anchors grow from there */
         .opaque_from = SCHEDULE_OPAQUE_FROM,
         .last_step_learns = true,
         .own_rates = true,
-        .geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0,
+        .geometry_from = geometry_from,
         .anchors_learn_when_adjusted = true,
         .importance = GROWTH_BY_SHARE,
         .gradient_counting = GROWTH_COUNT_BLENDED,

@@ -52,8 +52,8 @@ typedef struct train_rules {
                               SCHEDULE_EXACT_FROM */
     double raises_until;   /* progress until which the opacities of an offset that is below 0 in the
                               mean are raised */
-    double opaque_from;    /* progress from which the background has another colour in each step, so that
-                              surfaces become opaque; HUGE_VAL: never */
+    double opaque_from;    /* progress from which each view of a step has a background of another
+                              colour, so that surfaces become opaque; HUGE_VAL: never */
     bool own_rates;        /* higher learning rates, that fall to nothing in the end */
     double geometry_from;  /* progress from which offsets and scales learn, and anchors may grow
                               and be pruned */

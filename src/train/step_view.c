@@ -82,7 +82,7 @@ static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot, u
     return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
 }
 
-/* Late in a run another colour in each step: only what hides it is right on all of them. */
+/* Late in a run another colour for each view of a step: only what hides it is right on all of them. */
 static void pick_background(const trainer *t, uint64_t before, float out[3])
 {
     uint32_t words[4];
@@ -91,7 +91,7 @@ static void pick_background(const trainer *t, uint64_t before, float out[3])
         return;
     rng_philox(t->def.seed, STREAM_BACKGROUND, before, words);
     for (int c = 0; c < 3; c++)
-        out[c] = (float)(words[c] >> 8) * 0x1p-24f;
+        out[c] = rng_unit(words[c]);
 }
 
 void step_photos_pick(trainer *t)

@@ -44,7 +44,7 @@ typedef struct step_view {
     row_list rows;       /* both, with the anchors' numbers */
     view_outcome outcome;
     gbt_camera camera;   /* of the pixels that it looks at */
-    float background[3]; /* what lies behind the scene in this step */
+    float background[3]; /* what lies behind the scene, for this view */
     const unsigned char *valid;
     stage_time photo_time, compare_time; /* of the last step */
     double seconds;                      /* wall time of all but the photo */

@@ -6,7 +6,8 @@
                             (kept for the adjoint)
 
    Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
-   those straight into place. */
+   those straight into place. Inputs and hidden layers are computed again for each pass, and for the adjoint:
+   they take less time to compute than to write and to read back. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -25,7 +26,6 @@ typedef struct forward_job {
     const dense_kernels *kernels;
     decode_layout layout;
     decode_weights weights;
-    double camera[3];
     float opacity_min;
     gaussians *out;
     decode_tape *tape;
@@ -35,64 +35,20 @@ static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
-/* In double: exact differences for any finite input, no overflow of the squares, the same bits on every
-   machine. */
-static void view_inputs(const forward_job *job, const float *position, float out[4])
-{
-    double offset[3], square = 0;
-    for (int c = 0; c < 3; c++) {
-        offset[c] = (double)position[c] - job->camera[c];
-        square += offset[c] * offset[c];
-    }
-    const double distance = sqrt(square);
-    if (distance > 0 && distance < HUGE_VAL) {
-        for (int c = 0; c < 3; c++)
-            out[c] = (float)(offset[c] / distance);
-    } else {
-        out[0] = 0.0f;
-        out[1] = 0.0f;
-        out[2] = 1.0f;
-    }
-    out[3] = 0.0f;
-    if (job->d->has_distance) {
-        const double low = 0.5 * (double)job->d->distance_min,
-                     high = fmin(2.0 * (double)job->d->distance_max, 1e18);
-        out[3] = (float)fmin(fmax(distance * (double)job->d->distance_scale, low), high);
-    }
-}
-
 static void decide_rows(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
     const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE), offsets = job->layout.offset_count;
-    float *input = tape->input + begin * INPUT_STRIDE, *hidden = tape->hidden + begin * HIDDEN_STRIDE;
     float *alpha = tape->alpha + begin * offsets;
-    _Alignas(64) float logits[DECODE_CHUNK * ALPHA_STRIDE];
-    memset(input, 0, tiled * INPUT_STRIDE * sizeof *input);
-    for (size_t r = 0; r < rows; r++) {
-        const size_t anchor = tape->visible[begin + r];
-        float *row = input + r * INPUT_STRIDE;
-        memcpy(row, job->a->feature + anchor * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof *row);
-        view_inputs(job, job->a->position + anchor * 3, row + ANCHOR_FEATURE_DIM);
-        row[INPUT_ONE] = 1.0f;
-    }
-    job->kernels->product(&(dense_product){.m = tiled,
-                                           .n = ANCHOR_HIDDEN_DIM,
-                                           .k = INPUT_COUNT,
-                                           .a = input,
-                                           .a_row = INPUT_STRIDE,
-                                           .a_step = 1,
-                                           .b = job->weights.input_hidden,
-                                           .b_row = HIDDEN_STRIDE,
-                                           .bias = job->weights.hidden_bias,
-                                           .relu = true,
-                                           .c = hidden,
-                                           .c_row = HIDDEN_STRIDE});
+    _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * ANCHOR_HIDDEN_DIM],
+        logits[DECODE_CHUNK * ALPHA_STRIDE];
+    decode_inputs(job->a, job->d, tape->camera, tape->visible + begin, rows, input);
+    decode_hidden(job->kernels, &job->weights, input, tiled, 0, 1, hidden);
     job->kernels->product(&(dense_product){.m = tiled,
                                            .n = ALPHA_STRIDE,
                                            .k = ANCHOR_HIDDEN_DIM,
                                            .a = hidden,
-                                           .a_row = HIDDEN_STRIDE,
+                                           .a_row = ANCHOR_HIDDEN_DIM,
                                            .a_step = 1,
                                            .b = job->weights.hidden_out[0],
                                            .b_row = ALPHA_STRIDE,
@@ -113,14 +69,8 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
             kept += value > job->opacity_min;
         }
         tape->opacity_sum[begin + r] = sum;
-        if (kept == before)
-            continue;
-        if (filled < r) {
-            memcpy(input + filled * INPUT_STRIDE, input + r * INPUT_STRIDE, INPUT_STRIDE * sizeof *input);
-            memcpy(hidden + filled * HIDDEN_STRIDE, hidden + r * HIDDEN_STRIDE,
-                   ANCHOR_HIDDEN_DIM * sizeof *hidden);
-        }
-        tape->row[begin + filled++] = (uint32_t)(begin + r);
+        if (kept > before)
+            tape->row[begin + filled++] = (uint32_t)(begin + r);
     }
     tape->first[begin / DECODE_CHUNK] = kept;
     tape->filled[begin / DECODE_CHUNK] = (uint32_t)filled;
@@ -191,30 +141,25 @@ static void emit_rows(const forward_job *job, size_t begin)
 {
     decode_tape *tape = job->tape;
     const size_t rows = tape->filled[begin / DECODE_CHUNK], tiled = round_up(rows, DECODE_TILE);
-    float *hidden = tape->hidden + begin * HIDDEN_STRIDE;
-    _Alignas(64) float shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
+    const uint32_t *row = tape->row + begin;
+    enum { HIDDEN = (HEAD_COUNT - 1) * ANCHOR_HIDDEN_DIM };
+    _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN],
+        shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
         extent[DECODE_CHUNK * 6];
     uint16_t row_of[CHUNK_SLOTS];
+    uint32_t anchor[DECODE_CHUNK];
     float *const logits[2] = {shape, color};
-    job->kernels->product(&(dense_product){.m = tiled,
-                                           .n = HIDDEN_STRIDE - ANCHOR_HIDDEN_DIM,
-                                           .k = INPUT_COUNT,
-                                           .a = tape->input + begin * INPUT_STRIDE,
-                                           .a_row = INPUT_STRIDE,
-                                           .a_step = 1,
-                                           .b = job->weights.input_hidden + ANCHOR_HIDDEN_DIM,
-                                           .b_row = HIDDEN_STRIDE,
-                                           .bias = job->weights.hidden_bias + ANCHOR_HIDDEN_DIM,
-                                           .relu = true,
-                                           .c = hidden + ANCHOR_HIDDEN_DIM,
-                                           .c_row = HIDDEN_STRIDE});
+    for (size_t r = 0; r < rows; r++)
+        anchor[r] = tape->visible[row[r]];
+    decode_inputs(job->a, job->d, tape->camera, anchor, rows, input);
+    decode_hidden(job->kernels, &job->weights, input, tiled, 1, HEAD_COUNT, hidden);
     for (int head = 1; head <= 2; head++) {
         const size_t stride = job->layout.out_stride[head];
         job->kernels->product(&(dense_product){.m = tiled,
                                                .n = stride,
                                                .k = ANCHOR_HIDDEN_DIM,
-                                               .a = hidden + head * ANCHOR_HIDDEN_DIM,
-                                               .a_row = HIDDEN_STRIDE,
+                                               .a = hidden + (head - 1) * ANCHOR_HIDDEN_DIM,
+                                               .a_row = HIDDEN,
                                                .a_step = 1,
                                                .b = job->weights.hidden_out[head],
                                                .b_row = stride,
@@ -223,8 +168,7 @@ static void emit_rows(const forward_job *job, size_t begin)
                                                .c_row = stride});
     }
     for (size_t r = 0; r < rows; r++)
-        memcpy(extent + r * 6, job->a->scale_log + (size_t)tape->visible[tape->row[begin + r]] * 6,
-               6 * sizeof *extent);
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)anchor[r] * 6, 6 * sizeof *extent);
     job->kernels->exp(extent, rows * 6);
 
     const size_t n = gather_kept(job, begin, rows, shape, color, extent, row_of);
@@ -269,19 +213,16 @@ static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_erro
                         "decode tape", err));
     GBT_TRY(mem_reserve((void **)&tape->row, &tape->row_capacity, 0, rows, sizeof *tape->row, "decode tape",
                         err));
-    if (rows <= tape->capacity && tape->input != NULL)
+    if (rows <= tape->capacity && tape->alpha != NULL)
         return GBT_OK;
-    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE),
-                 width = INPUT_STRIDE + HIDDEN_STRIDE + ALPHA_STRIDE + 1;
-    float *block =
-        mem_alloc(capacity, width * sizeof *block, "decode tape", err); /* one owner (input), four arrays */
+    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE);
+    float *block = /* one owner (alpha), two arrays */
+        mem_alloc(capacity, (ALPHA_STRIDE + 1) * sizeof *block, "decode tape", err);
     if (block == NULL)
         return GBT_ERR_NO_MEMORY;
-    mem_free(tape->input);
+    mem_free(tape->alpha);
     tape->capacity = capacity;
-    tape->input = block;
-    tape->hidden = tape->input + capacity * INPUT_STRIDE;
-    tape->alpha = tape->hidden + capacity * HIDDEN_STRIDE;
+    tape->alpha = block;
     tape->opacity_sum = tape->alpha + capacity * ALPHA_STRIDE;
     return GBT_OK;
 }
@@ -331,18 +272,17 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
     tape->visible_count = 0;
     tape->kept_count = 0;
     GBT_TRY(check_arguments(a, d, visible, visible_count, err));
-    forward_job job = {
-        .a = a,
-        .d = d,
-        .kernels = dense_best(),
-        .layout = decode_layout_of(d),
-        .opacity_min = opacity_min,
-        .out = out,
-        .tape = tape,
-        .camera = {(double)camera_center[0], (double)camera_center[1], (double)camera_center[2]}};
+    forward_job job = {.a = a,
+                       .d = d,
+                       .kernels = dense_best(),
+                       .layout = decode_layout_of(d),
+                       .opacity_min = opacity_min,
+                       .out = out,
+                       .tape = tape};
     GBT_TRY(decode_pack_weights(d, &job.layout, tape, &job.weights, err));
     GBT_TRY(reserve_rows(tape, visible_count, err));
     tape->visible = visible;
+    memcpy(tape->camera, camera_center, sizeof tape->camera);
     parallel_blocks(visible_count, DECODE_GRAIN, decide_block, &job);
 
     const size_t chunks = parallel_block_count(visible_count, DECODE_CHUNK);
@@ -364,7 +304,7 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
 
 void decode_tape_free(decode_tape *tape)
 {
-    mem_free(tape->input);
+    mem_free(tape->alpha);
     mem_free(tape->output);
     mem_free(tape->first);
     mem_free(tape->filled);

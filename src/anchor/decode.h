@@ -13,13 +13,11 @@ typedef struct decode_tape {
     size_t visible_count, capacity;
     const uint32_t *visible; /* borrowed from decode_forward() until decode_backward() returns */
     float *alpha;            /* internal: opacities, kept or not, one row per visible anchor */
-    float *input; /* internal, kept for the adjoint: network inputs and hidden layers, one row per visible
-                     anchor that has Gaussians; in each chunk of visible rows these come first */
-    float *hidden;
-    uint32_t *row;    /* internal: which visible row each of these is */
-    uint32_t *filled; /* internal: how many there are in each chunk */
-    float *output;    /* internal: activations of the kept Gaussians, one array per field of `output_stride`
-                         floats */
+    uint32_t *row;           /* internal: the visible rows that have Gaussians, those of a chunk together */
+    uint32_t *filled;        /* internal: how many there are in each chunk */
+    float camera[3];         /* internal: the camera's centre */
+    float *output; /* internal: activations of the kept Gaussians, one array per field of `output_stride`
+                      floats */
     size_t output_stride;
     size_t kept_count;
     size_t *first; /* internal: first kept Gaussian of each chunk of rows */
@@ -75,14 +73,12 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
  * shapes, opacities and colours follow the direction u = (x - c) / r and the distance r of each anchor x:
  * du/dc = -(1 - u u^T) / r, dr/dc = -u; nothing follows a distance that was cut.
  *
- * @param camera_center [in]  of the last decode_forward() on `tape`
- * @param d_camera      [out] overwritten
+ * @param d_camera [out] overwritten
  * @return GBT_OK, GBT_ERR_ARGUMENT (shapes differ from the forward's), GBT_ERR_NO_MEMORY
  * Threads: same bits for every thread count. Cost: about half of decode_backward().
  */
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3],
-                                  decode_tape *tape, const gaussians *d_gaussians, double d_camera[3],
-                                  gbt_error *err);
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, decode_tape *tape,
+                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err);
 
 /**
  * Shift output biases of the opacity network: each offset whose mean opacity over the anchors of the last

@@ -15,9 +15,10 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { OUT_STRIDE_MAX = ALPHA_STRIDE + SHAPE_STRIDE_MAX + COLOR_STRIDE_MAX };
+enum { OUT_WIDTH_MAX = ALPHA_STRIDE + SHAPE_STRIDE_MAX + COLOR_STRIDE_MAX };
 
-/* A block's record: gradients of W1 with the bias as a column, then of W2 and b2 per head. */
+/* A block's record: gradients of W1 transposed, [INPUT_STRIDE][HIDDEN_STRIDE], with the bias as a row; then
+   of W2 and b2 per head. */
 typedef struct record_layout {
     size_t weight_first[HEAD_COUNT], bias_first[HEAD_COUNT], size;
 } record_layout;
@@ -34,19 +35,11 @@ typedef struct backward_job {
     bool packed;        /* d_anchors has a row for each visible anchor */
     float *d_params;
     const decoder *d; /* for the camera's gradient: */
-    double camera[3];
     double *d_camera; /* [block_count][3] */
     size_t block_count;
-    size_t out_first[HEAD_COUNT], out_stride; /* columns of one row of logit gradients */
 } backward_job;
 
 static const float zeros[HIDDEN_STRIDE];
-
-/* Where the gradient of a visible anchor goes. */
-static size_t gradient_row(const backward_job *job, size_t row)
-{
-    return job->packed ? row : job->tape->visible[row];
-}
 
 static record_layout record_layout_of(const decode_layout *layout)
 {
@@ -60,87 +53,6 @@ static record_layout record_layout_of(const decode_layout *layout)
     return record;
 }
 
-/* A scale that was raised to DECODE_SCALE_RATIO of the largest moves with that one alone. `scale` is before
-   the raising. */
-static void pass_held_scales(const float scale[3], float d_scale[3])
-{
-    const int large = scale[1] > scale[0] ? (scale[2] > scale[1] ? 2 : 1) : scale[2] > scale[0] ? 2 : 0;
-    for (int c = 0; c < 3; c++)
-        if (scale[c] < DECODE_SCALE_RATIO * scale[large]) {
-            d_scale[large] += DECODE_SCALE_RATIO * d_scale[c];
-            d_scale[c] = 0.0f;
-        }
-}
-
-/* Through the activations: logit gradients into `d_out`, offsets and log-scales straight into the anchors'
-   gradient. */
-static void activations_backward(const backward_job *job, size_t begin, size_t rows, const float *extent,
-                                 float *d_out)
-{
-    const decode_tape *tape = job->tape;
-    const gaussians *d = job->d_gaussians;
-    const size_t offsets = job->layout.offset_count, stride = tape->output_stride,
-                 chunk = begin / DECODE_CHUNK;
-    const float *kept = tape->output;
-    size_t g = tape->first[chunk];
-    const size_t last = tape->first[chunk + 1];
-    for (size_t r = 0; r < rows; r++) {
-        const size_t visible_row = tape->row[begin + r], slot_begin = visible_row * offsets;
-        const size_t anchor = tape->visible[visible_row], target = gradient_row(job, visible_row);
-        const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
-        const float *e = extent + r * 6, *scale_log = job->a->scale_log + anchor * 6;
-        float *row = d_out + r * job->out_stride;
-        float sum[6] = {0}, unwanted[3 * ANCHOR_MAX_OFFSETS] = {0};
-        float *d_offset = job->d_anchors != NULL ? job->d_anchors->offset + target * offsets * 3 : unwanted;
-        for (; g < last && tape->slot[g] < slot_begin + offsets; g++) {
-            const size_t k = tape->slot[g] - slot_begin;
-            const float d_mean[3] = {d->mean_x[g], d->mean_y[g], d->mean_z[g]};
-            float d_scale[3] = {d->scale_x[g], d->scale_y[g], d->scale_z[g]}, scale[3];
-            const float d_color[3] = {d->red[g], d->green[g], d->blue[g]};
-            const float d_quat[4] = {d->quat_w[g], d->quat_x[g], d->quat_y[g], d->quat_z[g]};
-            float *d_shape = row + job->out_first[1] + k * SHAPE_OUTPUTS,
-                  *d_logit = row + job->out_first[2] + k * COLOR_OUTPUTS;
-            for (int c = 0; c < 3; c++) {
-                const float shift = offset[k * 3 + (size_t)c] * e[c];
-                if (fabsf(x[c] + shift) < DECODE_MEAN_LIMIT) {
-                    d_offset[k * 3 + (size_t)c] += d_mean[c] * e[c];
-                    sum[c] += d_mean[c] * shift;
-                }
-                scale[c] = e[3 + c] * kept[(size_t)(KEPT_SIGMOID + c) * stride + g];
-                const float value = kept[(size_t)(KEPT_COLOR + c) * stride + g];
-                d_logit[c] = d_color[c] * (value * (1.0f - value));
-            }
-            pass_held_scales(scale, d_scale);
-            for (int c = 0; c < 3; c++) {
-                const float scaled = d_scale[c] * scale[c];
-                sum[3 + c] += scaled;
-                d_shape[c] = scaled * (1.0f - kept[(size_t)(KEPT_SIGMOID + c) * stride + g]);
-            }
-            float q[4], along = 0.0f;
-            for (int c = 0; c < 4; c++) {
-                q[c] = kept[(size_t)(KEPT_QUAT + c) * stride + g];
-                along += q[c] * d_quat[c];
-            }
-            const float inverse_length = kept[KEPT_INVERSE_LENGTH * stride + g];
-            for (int c = 0; c < 4; c++)
-                d_shape[3 + c] = (d_quat[c] - q[c] * along) * inverse_length;
-            const float alpha = kept[KEPT_ALPHA * stride + g];
-            row[job->out_first[0] + k] = d->opacity[g] * (1.0f - alpha * alpha);
-        }
-        if (job->d_anchors == NULL)
-            continue;
-        float *d_scale_log = job->d_anchors->scale_log + target * 6;
-        for (int c = 0; c < 6; c++)
-            d_scale_log[c] += decode_cut_gradient(scale_log[c], sum[c]);
-    }
-}
-
-FASTEST_CLONE static void relu_backward(const float *restrict hidden, size_t count, float *restrict d_hidden)
-{
-    for (size_t i = 0; i < count; i++)
-        d_hidden[i] = hidden[i] > 0.0f ? d_hidden[i] : 0.0f;
-}
-
 /* Adds `rows` rows of `count` values, `stride` apart, to `sum`. */
 FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, size_t stride, size_t count,
                                    float *restrict sum)
@@ -151,28 +63,27 @@ FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, si
 }
 
 /* Logit gradients back through the second layer and the ReLU. */
-static void hidden_backward(const backward_job *job, size_t begin, size_t tiled, const float *d_out,
+static void hidden_backward(const backward_job *job, const float *hidden, size_t tiled, const float *d_out,
                             float *d_hidden)
 {
-    const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE;
     for (int head = 0; head < HEAD_COUNT; head++)
         job->kernels->product(&(dense_product){.m = tiled,
                                                .n = ANCHOR_HIDDEN_DIM,
                                                .k = job->layout.out_count[head],
-                                               .a = d_out + job->out_first[head],
-                                               .a_row = job->out_stride,
+                                               .a = d_out + job->layout.out_first[head],
+                                               .a_row = job->layout.out_width,
                                                .a_step = 1,
                                                .b = job->weights.out_hidden[head],
                                                .b_row = ANCHOR_HIDDEN_DIM,
                                                .bias = zeros,
+                                               .gate = hidden + head * ANCHOR_HIDDEN_DIM,
                                                .c = d_hidden + head * ANCHOR_HIDDEN_DIM,
                                                .c_row = HIDDEN_STRIDE});
-    relu_backward(hidden, tiled * HIDDEN_STRIDE, d_hidden);
 }
 
-/* dL/dcamera of one row of the tape from the gradient of its direction and distance: moving the camera is
+/* dL/dcamera of one anchor from the gradient of its direction and distance: moving the camera is
    moving every anchor the other way. */
-static void view_backward(const backward_job *job, size_t row, const float *d_hidden, double d_camera[3])
+static void view_backward(const backward_job *job, size_t anchor, const float *d_hidden, double d_camera[3])
 {
     double d_input[4] = {0}, offset[3], square = 0, along = 0;
     for (int i = 0; i < 4; i++) {
@@ -180,9 +91,9 @@ static void view_backward(const backward_job *job, size_t row, const float *d_hi
         for (int h = 0; h < HIDDEN_STRIDE; h++)
             d_input[i] += (double)weight[h] * (double)d_hidden[h];
     }
-    const float *position = job->a->position + job->tape->visible[job->tape->row[row]] * (size_t)3;
+    const float *position = job->a->position + anchor * 3;
     for (int c = 0; c < 3; c++) {
-        offset[c] = (double)position[c] - job->camera[c];
+        offset[c] = (double)position[c] - (double)job->tape->camera[c];
         square += offset[c] * offset[c];
         along += offset[c] * d_input[c];
     }
@@ -196,79 +107,105 @@ static void view_backward(const backward_job *job, size_t row, const float *d_hi
         d_camera[c] -= (d_input[c] - offset[c] * (along / square) + offset[c] * d_distance) / distance;
 }
 
-/* Logit gradients back through the two layers of the three networks. */
-static void layers_backward(const backward_job *job, size_t begin, size_t rows, const float *d_out,
-                            float *record)
+/* The networks' gradient of a chunk, added to a record. */
+static void networks_backward(const backward_job *job, size_t rows, const float *input, const float *hidden,
+                              const float *d_out, const float *d_hidden, float *record)
 {
-    const dense_kernels *kernels = job->kernels;
-    const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
-    const float *hidden = job->tape->hidden + begin * HIDDEN_STRIDE,
-                *input = job->tape->input + begin * INPUT_STRIDE;
-    _Alignas(64) float d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM];
-    hidden_backward(job, begin, tiled, d_out, d_hidden);
+    const decode_layout *layout = &job->layout;
     for (int head = 0; head < HEAD_COUNT; head++) {
-        const float *d_logit = d_out + job->out_first[head];
-        kernels->product(&(dense_product){.m = job->layout.out_count[head],
-                                          .n = ANCHOR_HIDDEN_DIM,
-                                          .k = rows,
-                                          .a = d_logit,
-                                          .a_row = 1,
-                                          .a_step = job->out_stride,
-                                          .b = hidden + head * ANCHOR_HIDDEN_DIM,
-                                          .b_row = HIDDEN_STRIDE,
-                                          .c = record + job->record.weight_first[head],
-                                          .c_row = ANCHOR_HIDDEN_DIM});
-        add_rows(d_logit, rows, job->out_stride, job->layout.out_stride[head],
+        const float *d_logit = d_out + layout->out_first[head];
+        job->kernels->product(&(dense_product){.m = layout->out_count[head],
+                                               .n = ANCHOR_HIDDEN_DIM,
+                                               .k = rows,
+                                               .a = d_logit,
+                                               .a_row = 1,
+                                               .a_step = layout->out_width,
+                                               .b = hidden + head * ANCHOR_HIDDEN_DIM,
+                                               .b_row = HIDDEN_STRIDE,
+                                               .c = record + job->record.weight_first[head],
+                                               .c_row = ANCHOR_HIDDEN_DIM});
+        add_rows(d_logit, rows, layout->out_width, layout->out_stride[head],
                  record + job->record.bias_first[head]);
     }
-    kernels->product(&(dense_product){.m = HIDDEN_STRIDE,
-                                      .n = INPUT_STRIDE,
-                                      .k = rows,
-                                      .a = d_hidden,
-                                      .a_row = 1,
-                                      .a_step = HIDDEN_STRIDE,
-                                      .b = input,
-                                      .b_row = INPUT_STRIDE,
-                                      .c = record,
-                                      .c_row = INPUT_STRIDE});
-    kernels->product(&(dense_product){.m = tiled,
-                                      .n = ANCHOR_FEATURE_DIM,
-                                      .k = HIDDEN_STRIDE,
-                                      .a = d_hidden,
-                                      .a_row = HIDDEN_STRIDE,
-                                      .a_step = 1,
-                                      .b = job->weights.hidden_input,
-                                      .b_row = ANCHOR_FEATURE_DIM,
-                                      .bias = zeros,
-                                      .c = d_feature,
-                                      .c_row = ANCHOR_FEATURE_DIM});
-    for (size_t r = 0; r < rows; r++) {
-        float *target =
-            job->d_anchors->feature + gradient_row(job, job->tape->row[begin + r]) * ANCHOR_FEATURE_DIM;
-        for (int i = 0; i < ANCHOR_FEATURE_DIM; i++)
-            target[i] += d_feature[r * ANCHOR_FEATURE_DIM + (size_t)i];
-    }
+    job->kernels->product(&(dense_product){.m = INPUT_STRIDE,
+                                           .n = HIDDEN_STRIDE,
+                                           .k = rows,
+                                           .a = input,
+                                           .a_row = 1,
+                                           .a_step = INPUT_STRIDE,
+                                           .b = d_hidden,
+                                           .b_row = HIDDEN_STRIDE,
+                                           .c = record,
+                                           .c_row = HIDDEN_STRIDE});
+}
+
+FASTEST_CLONE static void add_features(const float *restrict d_feature, size_t rows, const uint32_t *target,
+                                       float *restrict sum)
+{
+    for (size_t r = 0; r < rows; r++)
+        for (size_t i = 0; i < ANCHOR_FEATURE_DIM; i++)
+            sum[(size_t)target[r] * ANCHOR_FEATURE_DIM + i] += d_feature[r * ANCHOR_FEATURE_DIM + i];
 }
 
 static void chunk_backward(const backward_job *job, size_t begin, size_t rows, float *record,
                            double *d_camera)
 {
-    _Alignas(64) float d_out[DECODE_CHUNK * OUT_STRIDE_MAX], extent[DECODE_CHUNK * 6];
-    const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
-    memset(d_out, 0, tiled * job->out_stride * sizeof *d_out);
-    for (size_t r = 0; r < rows; r++)
-        memcpy(extent + r * 6, job->a->scale_log + (size_t)job->tape->visible[job->tape->row[begin + r]] * 6,
-               6 * sizeof *extent);
+    const decode_tape *tape = job->tape;
+    const size_t chunk = begin / DECODE_CHUNK, tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
+    _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN_STRIDE],
+        d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_out[DECODE_CHUNK * OUT_WIDTH_MAX],
+        d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM], extent[DECODE_CHUNK * 6], d_scale_log[DECODE_CHUNK * 6];
+    uint32_t anchor[DECODE_CHUNK], target[DECODE_CHUNK];
+    for (size_t r = 0; r < rows; r++) {
+        const uint32_t row = tape->row[begin + r];
+        anchor[r] = tape->visible[row];
+        target[r] = job->packed ? row : anchor[r];
+        memcpy(extent + r * 6, job->a->scale_log + (size_t)anchor[r] * 6, 6 * sizeof *extent);
+    }
     job->kernels->exp(extent, rows * 6);
-    activations_backward(job, begin, rows, extent, d_out);
-    if (job->d_anchors != NULL) {
-        layers_backward(job, begin, rows, d_out, record);
+    memset(d_out, 0, tiled * job->layout.out_width * sizeof *d_out);
+    memset(d_scale_log, 0, rows * 6 * sizeof *d_scale_log);
+    decode_activations_backward(
+        &(decode_slopes){.a = job->a,
+                         .tape = tape,
+                         .layout = &job->layout,
+                         .d_gaussians = job->d_gaussians,
+                         .begin = begin,
+                         .anchor = anchor,
+                         .target = target,
+                         .extent = extent,
+                         .d_out = d_out,
+                         .d_scale_log = d_scale_log,
+                         .d_offset = job->d_anchors != NULL ? job->d_anchors->offset : NULL},
+        tape->first[chunk], tape->first[chunk + 1]);
+
+    decode_inputs(job->a, job->d, tape->camera, anchor, rows, input);
+    decode_hidden(job->kernels, &job->weights, input, tiled, 0, HEAD_COUNT, hidden);
+    hidden_backward(job, hidden, tiled, d_out, d_hidden);
+    if (job->d_anchors == NULL) {
+        for (size_t r = 0; r < rows; r++)
+            view_backward(job, anchor[r], d_hidden + r * HIDDEN_STRIDE, d_camera);
         return;
     }
-    _Alignas(64) float d_hidden[DECODE_CHUNK * HIDDEN_STRIDE];
-    hidden_backward(job, begin, tiled, d_out, d_hidden);
-    for (size_t r = 0; r < rows; r++)
-        view_backward(job, begin + r, d_hidden + r * HIDDEN_STRIDE, d_camera);
+    networks_backward(job, rows, input, hidden, d_out, d_hidden, record);
+    job->kernels->product(&(dense_product){.m = tiled,
+                                           .n = ANCHOR_FEATURE_DIM,
+                                           .k = HIDDEN_STRIDE,
+                                           .a = d_hidden,
+                                           .a_row = HIDDEN_STRIDE,
+                                           .a_step = 1,
+                                           .b = job->weights.hidden_input,
+                                           .b_row = ANCHOR_FEATURE_DIM,
+                                           .bias = zeros,
+                                           .c = d_feature,
+                                           .c_row = ANCHOR_FEATURE_DIM});
+    add_features(d_feature, rows, target, job->d_anchors->feature);
+    for (size_t r = 0; r < rows; r++) {
+        const float *scale_log = job->a->scale_log + (size_t)anchor[r] * 6;
+        float *sum = job->d_anchors->scale_log + (size_t)target[r] * 6;
+        for (size_t c = 0; c < 6; c++)
+            sum[c] += decode_cut_gradient(scale_log[c], d_scale_log[r * 6 + c]);
+    }
 }
 
 static void backward_block(size_t block, size_t begin, size_t end, void *context)
@@ -291,23 +228,25 @@ static void sum_records(const backward_job *job, size_t entry, size_t count, flo
     add_rows(job->tape->block_grad + entry, job->block_count, job->record.size, count, sum);
 }
 
-/* Rows of W1 with their bias as a column first, then rows of W2, each with its bias. */
+/* Rows of W1 transposed, the bias among them, then rows of W2, each with its bias. */
 static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const backward_job *job = context;
     const size_t in = job->layout.input_count;
-    float sum[INPUT_STRIDE];
+    float sum[HIDDEN_STRIDE];
     for (size_t row = begin; row < end; row++) {
-        if (row < HIDDEN_STRIDE) {
-            const size_t head = row / ANCHOR_HIDDEN_DIM, h = row % ANCHOR_HIDDEN_DIM;
-            float *d_weight = job->d_params + job->layout.param_first[head];
-            sum_records(job, row * INPUT_STRIDE, INPUT_STRIDE, sum);
-            for (size_t i = 0; i < in; i++)
-                d_weight[h * in + i] += sum[i];
-            d_weight[ANCHOR_HIDDEN_DIM * in + h] += sum[INPUT_ONE];
+        if (row < INPUT_STRIDE) {
+            if (row >= in && row != INPUT_ONE)
+                continue;
+            sum_records(job, row * HIDDEN_STRIDE, HIDDEN_STRIDE, sum);
+            for (size_t column = 0; column < HIDDEN_STRIDE; column++) {
+                const size_t head = column / ANCHOR_HIDDEN_DIM, h = column % ANCHOR_HIDDEN_DIM;
+                float *d_weight = job->d_params + job->layout.param_first[head];
+                d_weight[row == INPUT_ONE ? ANCHOR_HIDDEN_DIM * in + h : h * in + row] += sum[column];
+            }
         } else {
-            size_t head = 0, o = row - HIDDEN_STRIDE;
+            size_t head = 0, o = row - INPUT_STRIDE;
             for (; o >= job->layout.out_count[head]; head++)
                 o -= job->layout.out_count[head];
             float *d_weight = job->d_params + job->layout.param_first[head] + ANCHOR_HIDDEN_DIM * (in + 1);
@@ -337,10 +276,6 @@ static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape
                           .tape = tape,
                           .d_gaussians = d_gaussians,
                           .block_count = parallel_block_count(tape->visible_count, DECODE_GRAIN)};
-    for (int head = 0; head < HEAD_COUNT; head++) {
-        job->out_first[head] = job->out_stride;
-        job->out_stride += job->layout.out_stride[head];
-    }
     return decode_pack_weights(d, &job->layout, tape, &job->weights, err);
 }
 
@@ -360,7 +295,7 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
     job.packed = d_anchors->count == tape->visible_count;
     job.d_params = d_params;
     job.record = record_layout_of(&job.layout);
-    size_t row_count = HIDDEN_STRIDE;
+    size_t row_count = INPUT_STRIDE;
     for (int head = 0; head < HEAD_COUNT; head++)
         row_count += job.layout.out_count[head];
     void *records = tape->block_grad;
@@ -372,9 +307,8 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
     return GBT_OK;
 }
 
-gbt_status decode_backward_camera(const anchors *a, const decoder *d, const float camera_center[3],
-                                  decode_tape *tape, const gaussians *d_gaussians, double d_camera[3],
-                                  gbt_error *err)
+gbt_status decode_backward_camera(const anchors *a, const decoder *d, decode_tape *tape,
+                                  const gaussians *d_gaussians, double d_camera[3], gbt_error *err)
 {
     backward_job job;
     d_camera[0] = d_camera[1] = d_camera[2] = 0;
@@ -384,8 +318,6 @@ gbt_status decode_backward_camera(const anchors *a, const decoder *d, const floa
     job.d_camera = mem_calloc(job.block_count, 3 * sizeof *job.d_camera, "decode adjoint", err);
     if (job.d_camera == NULL)
         return GBT_ERR_NO_MEMORY;
-    for (int c = 0; c < 3; c++)
-        job.camera[c] = (double)camera_center[c];
     parallel_blocks(tape->visible_count, DECODE_GRAIN, backward_block, &job);
     for (size_t i = 0; i < 3 * job.block_count; i++)
         d_camera[i % 3] += job.d_camera[i];

@@ -16,6 +16,8 @@ decode_layout decode_layout_of(const decoder *d)
         layout.out_count[head] = parts[head].outputs * layout.offset_count;
         layout.out_stride[head] =
             (layout.out_count[head] + DENSE_COLUMNS - 1) / DENSE_COLUMNS * DENSE_COLUMNS;
+        layout.out_first[head] = layout.out_width;
+        layout.out_width += layout.out_stride[head];
         layout.param_first[head] = parts[head].begin;
     }
     return layout;

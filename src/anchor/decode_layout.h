@@ -19,7 +19,7 @@ enum {
     INPUT_COUNT = ANCHOR_FEATURE_DIM + 4, /* feature, direction, distance; the distance is 0 when the networks
                                              do not have it */
     INPUT_ONE = INPUT_COUNT, /* a column of ones: it turns the bias gradient into one more weight gradient */
-    INPUT_STRIDE = 48,
+    INPUT_STRIDE = 40,       /* a multiple of the register tile: inputs are rows of a product, too */
     HEAD_COUNT = DECODER_PARTS, /* opacity, shape, colour */
     HIDDEN_STRIDE = HEAD_COUNT * ANCHOR_HIDDEN_DIM,
     ALPHA_STRIDE = ANCHOR_MAX_OFFSETS,
@@ -48,10 +48,11 @@ enum {
 #define DECODE_SCALE_RATIO 1e-4f
 
 typedef struct decode_layout {
-    size_t offset_count, input_count; /* input_count is the decoder's own: 35 or 36 */
-    size_t out_count[HEAD_COUNT];     /* K, 7K, 3K */
-    size_t out_stride[HEAD_COUNT];    /* the same, rounded up to DENSE_COLUMNS */
-    size_t param_first[HEAD_COUNT];   /* of the head's part in decoder.params: W1, b1, W2, b2 */
+    size_t offset_count, input_count;        /* input_count is the decoder's own: 35 or 36 */
+    size_t out_count[HEAD_COUNT];            /* K, 7K, 3K */
+    size_t out_stride[HEAD_COUNT];           /* the same, rounded up to DENSE_COLUMNS */
+    size_t out_first[HEAD_COUNT], out_width; /* the heads' outputs side by side, so rounded up */
+    size_t param_first[HEAD_COUNT];          /* of the head's part in decoder.params: W1, b1, W2, b2 */
 } decode_layout;
 
 decode_layout decode_layout_of(const decoder *d);
@@ -66,9 +67,38 @@ typedef struct decode_weights {
     float *out_hidden[HEAD_COUNT]; /* [out_count][ANCHOR_HIDDEN_DIM] */
 } decode_weights;
 
+/**
+ * What the networks see of some anchors: feature, unit direction from the camera, distance or 0, and 1.
+ *
+ * @param which [in]  [rows] anchors; rows <= DECODE_CHUNK
+ * @param input [out] [rows, rounded up to DECODE_TILE with rows of zeros][INPUT_STRIDE]
+ */
+void decode_inputs(const anchors *a, const decoder *d, const float camera[3], const uint32_t *which,
+                   size_t rows, float *input);
+
+/** Hidden layers of the heads [head, end): hidden [tiled][(end - head) * ANCHOR_HIDDEN_DIM], after ReLU. */
+void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,
+                   size_t tiled, int head, int end, float *hidden);
+
 /** Pack the networks into tape->weights (grown as needed). */
 gbt_status decode_pack_weights(const decoder *d, const decode_layout *layout, decode_tape *tape,
                                decode_weights *out, gbt_error *err);
+
+/** A chunk of the adjoint: what decode_activations_backward() needs, and where it writes to. */
+typedef struct decode_slopes {
+    const anchors *a;
+    const decode_tape *tape;
+    const decode_layout *layout;
+    const gaussians *d_gaussians;
+    size_t begin;                          /* the chunk's first row in tape->row */
+    const uint32_t *anchor, *target;       /* [rows]: the anchors, and their rows in d_offset */
+    const float *extent;                   /* [rows][6]: exp of the log-scales */
+    float *d_out, *d_scale_log, *d_offset; /* [rows][out_width], [rows][6], [...][K][3] or NULL: added to, but
+                                              for d_out, whose places without a Gaussian are left alone */
+} decode_slopes;
+
+/** Through the activations of Gaussians [g, end), all of the chunk. */
+void decode_activations_backward(const decode_slopes *s, size_t g, size_t end);
 
 /** The gradient of a log-scale that the adjoint found, or 0 where the forward pass cut it. */
 static inline float decode_cut_gradient(float scale_log, float gradient)

@@ -24,6 +24,7 @@ typedef struct dense_product {
     size_t b_row;
     const float *bias; /* [n] or NULL */
     bool relu;         /* max(result, 0); a NaN becomes 0 */
+    const float *gate; /* [m][c_row] or NULL: 0 where this is not above 0, the adjoint of a ReLU */
     float *c;
     size_t c_row;
 } dense_product;

@@ -12,6 +12,7 @@ typedef __m256 vec;
 #define vec_zero _mm256_setzero_ps
 #define vec_fma _mm256_fmadd_ps
 #define vec_max _mm256_max_ps
+#define vec_where_above_zero(gate, x) _mm256_and_ps(_mm256_cmp_ps(gate, _mm256_setzero_ps(), _CMP_GT_OQ), x)
 #include "anchor/dense_tiles.inc.h"
 
 const dense_kernels dense_kernels_avx2 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,

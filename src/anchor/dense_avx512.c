@@ -15,6 +15,8 @@ typedef __m512 vec;
 #define vec_zero _mm512_setzero_ps
 #define vec_fma _mm512_fmadd_ps
 #define vec_max _mm512_max_ps
+#define vec_where_above_zero(gate, x)                                                                        \
+    _mm512_maskz_mov_ps(_mm512_cmp_ps_mask(gate, _mm512_setzero_ps(), _CMP_GT_OQ), x)
 #include "anchor/dense_tiles.inc.h"
 
 const dense_kernels dense_kernels_avx512 = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,

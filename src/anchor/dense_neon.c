@@ -12,6 +12,7 @@ typedef float32x4_t vec;
 #define vec_zero() vdupq_n_f32(0)
 #define vec_fma(a, b, sum) vfmaq_f32(sum, a, b)
 #define vec_max(a, b) vbslq_f32(vcgtq_f32(a, b), a, b)
+#define vec_where_above_zero(gate, x) vbslq_f32(vcgtq_f32(gate, vec_zero()), x, vec_zero())
 #include "anchor/dense_tiles.inc.h"
 
 const dense_kernels dense_kernels_neon = {dense_multiply, dense_exp, dense_tanh, dense_sigmoid,

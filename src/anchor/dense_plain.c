@@ -12,7 +12,8 @@ static void dense_multiply(const dense_product *job)
             float sum = job->bias != NULL ? job->bias[j] : *c;
             for (size_t t = 0; t < job->k; t++)
                 sum = fmaf(job->a[i * job->a_row + t * job->a_step], job->b[t * job->b_row + j], sum);
-            *c = !job->relu || sum > 0.0f ? sum : 0.0f;
+            const bool shut = job->gate != NULL && !(job->gate[i * job->c_row + j] > 0.0f);
+            *c = shut || (job->relu && !(sum > 0.0f)) ? 0.0f : sum;
         }
     }
 }

@@ -2,7 +2,7 @@
 /* anchor/dense_tiles.inc.h -- the matrix product as register tiles; the including file says what a vector is.
 
    Needs: vec, LANES, TILE_ROWS (rows of c held in registers, times two vectors), vec_load, vec_store,
-   vec_set1, vec_zero, vec_fma and vec_max. */
+   vec_set1, vec_zero, vec_fma, vec_max and vec_where_above_zero(gate, x). */
 #include "anchor/dense.h"
 
 /* `rows` and `vectors` are constants at every call, so the loops over them unroll and `sum` lives in
@@ -51,6 +51,9 @@ static inline __attribute__((always_inline)) void tile(const int rows, const int
         for (int j = 0; j < vectors; j++) {
             if (job->relu)
                 sum[i][j] = vec_max(sum[i][j], vec_zero()); /* second operand wins against NaN */
+            if (job->gate != NULL)
+                sum[i][j] = vec_where_above_zero(
+                    vec_load(job->gate + (row + (size_t)i) * job->c_row + column + j * LANES), sum[i][j]);
             vec_store(c + (size_t)i * job->c_row + j * LANES, sum[i][j]);
         }
 }

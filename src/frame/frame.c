@@ -279,8 +279,8 @@ gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6]
         GBT_TRY(plain_backward_view(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians,
                                     &f->d_gaussians, NULL, d_eye, err));
     else
-        GBT_TRY(decode_backward_camera(subject.anchors, subject.decoder, f->eye, &f->tape, &f->d_gaussians,
-                                       d_eye, err));
+        GBT_TRY(
+            decode_backward_camera(subject.anchors, subject.decoder, &f->tape, &f->d_gaussians, d_eye, err));
     const double eye[3] = {(double)f->eye[0], (double)f->eye[1], (double)f->eye[2]};
     return pose_gradient(&f->gaussians, &f->d_gaussians, &f->camera, eye, d_eye, d_pose, err);
 }

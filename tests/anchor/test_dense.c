@@ -61,18 +61,19 @@ static void products(void **state)
     (void)state;
     const size_t ms[] = {1, 2, 3, 4, 5, 9, 10, 13, 23, 30}, ns[] = {16, 32, 48, 80}, ks[] = {0, 1, 7, 36};
     enum { SIZE = 80 * 80 };
-    static float a[SIZE], b[SIZE], start[SIZE], got[CPU_ISA_COUNT][SIZE];
+    static float a[SIZE], b[SIZE], start[SIZE], gate[SIZE], got[CPU_ISA_COUNT][SIZE];
     for (size_t i = 0; i < SIZE; i++) {
         a[i] = spread(1, 0, i, -1, 1);
         b[i] = spread(1, 1, i, -1, 1);
         start[i] = spread(1, 2, i, -1, 1);
+        gate[i] = i % 7 == 0 ? (i % 2 == 0 ? NAN : 0.0f) : spread(1, 3, i, -1, 1);
     }
     const int best = (int)cpu_best_isa();
     for (size_t mi = 0; mi < 10; mi++)
         for (size_t ni = 0; ni < 4; ni++)
             for (size_t ki = 0; ki < 4; ki++)
-                for (int mode = 0; mode < 8; mode++) {
-                    const bool transposed = mode & 1, biased = mode & 2, relu = mode & 4;
+                for (int mode = 0; mode < 16; mode++) {
+                    const bool transposed = mode & 1, biased = mode & 2, relu = mode & 4, gated = mode & 8;
                     dense_product job = {.m = ms[mi],
                                          .n = ns[ni],
                                          .k = ks[ki],
@@ -83,6 +84,7 @@ static void products(void **state)
                                          .b_row = 80,
                                          .bias = biased ? start : NULL,
                                          .relu = relu,
+                                         .gate = gated ? gate : NULL,
                                          .c_row = 80};
                     for (int isa = 0; isa <= best; isa++) {
                         memcpy(got[isa], start, sizeof start);
@@ -97,6 +99,7 @@ static void products(void **state)
                                 for (size_t t = 0; t < job.k; t++)
                                     want += (double)a[i * job.a_row + t * job.a_step] * (double)b[t * 80 + j];
                                 want = relu ? fmax(want, 0) : want;
+                                want = !gated || gate[i * 80 + j] > 0.0f ? want : 0;
                             }
                             if (!(fabs((double)got[0][i * 80 + j] - want) <= 3e-6))
                                 fail_msg("m %zu n %zu k %zu mode %d: [%zu][%zu] is %g, not %g", job.m, job.n,

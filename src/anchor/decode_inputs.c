@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* anchor/decode_inputs.c -- what the networks see of an anchor (its feature, and where it is seen from), and
+   their hidden layers. */
+#include <math.h>
+#include <string.h>
+
+#include "anchor/decode_layout.h"
+#include "base/clones.h"
+
+static double cut(double x, double low, double high)
+{
+    const double above = x > low ? x : low;
+    return above < high ? above : high;
+}
+
+/* Directions and distances in double: exact differences for any finite input, no overflow of the squares, the
+   same bits on every machine. */
+FASTEST_CLONE void decode_inputs(const anchors *a, const decoder *d, const float camera[3],
+                                 const uint32_t *which, size_t rows, float *input)
+{
+    double offset[3][DECODE_CHUNK], distance[DECODE_CHUNK];
+    for (size_t r = 0; r < rows; r++) {
+        const float *position = a->position + (size_t)which[r] * 3;
+        for (int c = 0; c < 3; c++)
+            offset[c][r] = (double)position[c] - (double)camera[c];
+    }
+    for (size_t r = 0; r < rows; r++) {
+        const double x = offset[0][r], y = offset[1][r], z = offset[2][r], far = sqrt(x * x + y * y + z * z);
+        const int there = (far > 0) & (far < HUGE_VAL);
+        offset[0][r] = there ? x / far : 0;
+        offset[1][r] = there ? y / far : 0;
+        offset[2][r] = there ? z / far : 1;
+        distance[r] = far;
+    }
+    const double low = 0.5 * (double)d->distance_min, high = fmin(2.0 * (double)d->distance_max, 1e18);
+    for (size_t r = 0; r < rows; r++) {
+        float *row = input + r * INPUT_STRIDE;
+        memcpy(row, a->feature + (size_t)which[r] * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof *row);
+        for (int c = 0; c < 3; c++)
+            row[ANCHOR_FEATURE_DIM + c] = (float)offset[c][r];
+        row[ANCHOR_FEATURE_DIM + 3] =
+            d->has_distance ? (float)cut(distance[r] * (double)d->distance_scale, low, high) : 0.0f;
+        row[INPUT_ONE] = 1.0f;
+        for (int i = INPUT_ONE + 1; i < INPUT_STRIDE; i++)
+            row[i] = 0.0f;
+    }
+    const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
+    memset(input + rows * INPUT_STRIDE, 0, (tiled - rows) * INPUT_STRIDE * sizeof *input);
+}
+
+void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,
+                   size_t tiled, int head, int end, float *hidden)
+{
+    const int first = head * ANCHOR_HIDDEN_DIM, count = (end - head) * ANCHOR_HIDDEN_DIM;
+    kernels->product(&(dense_product){.m = tiled,
+                                      .n = (size_t)count,
+                                      .k = INPUT_COUNT,
+                                      .a = input,
+                                      .a_row = INPUT_STRIDE,
+                                      .a_step = 1,
+                                      .b = weights->input_hidden + first,
+                                      .b_row = HIDDEN_STRIDE,
+                                      .bias = weights->hidden_bias + first,
+                                      .relu = true,
+                                      .c = hidden,
+                                      .c_row = (size_t)count});
+}

@@ -8,6 +8,7 @@
 #include "gbtrace/evaluate.h"
 #include "io/model_file.h"
 #include "quiet.h"
+#include "train/schedule.h"
 
 /* Photos of `scene`, changed in place. */
 static void change_photos(const char *folder, void (*change)(image *photo, size_t view))
@@ -280,6 +281,10 @@ static void alpha_is_what_it_is_said_to_be(void **state)
             assert_true(cases[i].background < 0 ? m.background[c] > 0 && m.background[c] < 1
                                                 : m.background[c] == cases[i].background);
         model_free(&m);
+        trainer t;
+        open_ok(&t, folder, &def);
+        assert_true(t.rules.opaque_from == (cases[i].masked ? SCHEDULE_OPAQUE_FROM : HUGE_VAL));
+        trainer_free(&t);
     }
     gbt_train_def def = run_def();
     def.alpha = (gbt_alpha)7;

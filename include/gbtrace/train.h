@@ -32,8 +32,8 @@ typedef struct gbt_train_def {
     int views;             /* photos that a step looks at, a power of two up to 64; results depend on it */
     const char *pace; /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records
                          them; NULL: as the budget allows */
-    double downscale; /* of the photos' width and height; 0: the median photo becomes 1,600 pixels wide if it
-                         is wider, with compat 1 */
+    double downscale; /* of the cameras' width and height; 0: to the size of the photos if they are smaller,
+                         then to 1,600 pixels if the median photo is wider, but for compat */
     gbt_renderer renderer; /* what the photos are compared with; one that trains */
     double footprint; /* rays are as wide as pixels: variance of a pixel, px^2; 0: thin rays. 0 with compat,
                          splats are dilated then */

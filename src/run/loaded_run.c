@@ -157,7 +157,7 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
     if (downscale <= 0)
         downscale = out->def.downscale;
     if (downscale <= 0) /* Gaussians of others, whose file says nothing */
-        downscale = photos_usual_downscale(&out->scene);
+        downscale = photos_usual_downscale(&out->scene, true);
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
 

@@ -8,6 +8,7 @@
 
 #include "base/compare.h"
 #include "base/fail.h"
+#include "base/image_header.h"
 #include "base/machine.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -15,18 +16,31 @@
 
 enum { PICK_ROWS = 32 /* of one thread at a time */, USUAL_WIDTH = 1600 /* as in 3DGS */ };
 
-double photos_usual_downscale(const scene *s)
+static double median(float *values, size_t count)
 {
-    float *widths = mem_alloc(s->view_count, sizeof *widths, "photo widths", NULL);
-    double median = 0;
-    for (size_t i = 0; widths != NULL && i < s->view_count; i++)
-        widths[i] = (float)s->views[i].camera.width;
-    if (widths != NULL && s->view_count > 0) {
-        qsort(widths, s->view_count, sizeof *widths, compare_floats);
-        median = (double)widths[s->view_count / 2];
+    qsort(values, count, sizeof *values, compare_floats);
+    return (double)values[count / 2];
+}
+
+double photos_usual_downscale(const scene *s, bool limits_width)
+{
+    float *widths = mem_alloc(2 * s->view_count + 1, sizeof *widths, "photo widths", NULL);
+    if (widths == NULL || s->view_count == 0) {
+        mem_free(widths);
+        return 1;
     }
+    float *ratios = widths + s->view_count; /* of the cameras' widths to them */
+    for (size_t i = 0; i < s->view_count; i++) {
+        const scene_view *view = &s->views[i];
+        image_header h;
+        const bool is_smaller = view->path != NULL && image_header_read(view->path, &h, NULL) == GBT_OK &&
+                                h.width > 0 && h.width < view->camera.width;
+        widths[i] = (float)(is_smaller ? h.width : view->camera.width);
+        ratios[i] = (float)view->camera.width / widths[i];
+    }
+    const double width = median(widths, s->view_count), ratio = median(ratios, s->view_count);
     mem_free(widths);
-    return fmax(1, median / USUAL_WIDTH);
+    return ratio * (limits_width ? fmax(1, width / USUAL_WIDTH) : 1);
 }
 
 /* Nothing but time depends on it. */
@@ -49,7 +63,9 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
     p->valid = mem_calloc(source->view_count, sizeof *p->valid, "photo cache", err);
-    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL
+    p->through = mem_calloc(source->view_count, sizeof *p->through, "photo cache", err);
+    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL ||
+                   p->through == NULL
                ? GBT_ERR_NO_MEMORY
                : GBT_OK;
 }
@@ -64,8 +80,8 @@ static void drop_all(unsigned char **pixels, size_t count)
 
 void photos_close(photos *p)
 {
-    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid};
-    for (int i = 0; i < 4; i++) {
+    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid, p->through};
+    for (int i = 0; i < 5; i++) {
         drop_all(caches[i], p->source->view_count);
         mem_free(caches[i]);
     }
@@ -85,6 +101,8 @@ gbt_camera photos_camera(const photos *p, size_t view, int level)
     return photo_camera_divided(&p->source->views[view].camera, ldexp(p->downscale, level));
 }
 
+static unsigned char to_byte(float x) { return (unsigned char)(fminf(fmaxf(x, 0.0f), 1.0f) * 255 + 0.5f); }
+
 static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
 {
     const size_t count = (size_t)im->width * (size_t)im->height * 3;
@@ -92,17 +110,25 @@ static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
     if (bytes == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
-        bytes[i] = (unsigned char)(fminf(fmaxf(im->pixels[i], 0.0f), 1.0f) * 255 + 0.5f);
+        bytes[i] = to_byte(im->pixels[i]);
     *out = bytes;
     return GBT_OK;
 }
 
-/* Every `step`-th pixel of every `step`-th row, from `from` on; rows are `row` bytes long. */
+/* Every `step`-th pixel of every `step`-th row, from pixel `first` on; rows have `row` pixels. */
 typedef struct pick_job {
-    const unsigned char *from;
-    size_t row, step;
+    const unsigned char *from, *through; /* through NULL: opaque, or to stay as it is */
+    float change[3];                     /* of the colour behind what is transparent */
+    size_t first, row, step;
     image *out;
 } pick_job;
+
+static void lay_on(const pick_job *job, const unsigned char *through, float *to)
+{
+    for (size_t x = 0; x < (size_t)job->out->width; x++)
+        for (size_t c = 0; c < 3; c++)
+            to[3 * x + c] += (float)through[x * job->step] * (1.0f / 255) * job->change[c];
+}
 
 static void pick_rows(size_t block, size_t begin, size_t end, void *context)
 {
@@ -110,22 +136,25 @@ static void pick_rows(size_t block, size_t begin, size_t end, void *context)
     const pick_job *job = context;
     const size_t width = (size_t)job->out->width, stride = 3 * job->step;
     for (size_t y = begin; y < end; y++) {
-        const unsigned char *from = job->from + y * job->step * job->row;
+        const size_t first = job->first + y * job->step * job->row;
+        const unsigned char *from = job->from + 3 * first;
         float *to = job->out->pixels + 3 * y * width;
         if (job->step == 1) { /* one run, of which the compiler makes vectors */
             for (size_t i = 0; i < 3 * width; i++)
                 to[i] = (float)from[i] * (1.0f / 255);
-            continue;
+        } else {
+            for (size_t x = 0; x < width; x++)
+                for (size_t c = 0; c < 3; c++)
+                    to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
         }
-        for (size_t x = 0; x < width; x++)
-            for (size_t c = 0; c < 3; c++)
-                to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
+        if (job->through != NULL)
+            lay_on(job, job->through + first, to);
     }
 }
 
 static void from_bytes(const unsigned char *bytes, image *out)
 {
-    pick_job job = {.from = bytes, .row = 3 * (size_t)out->width, .step = 1, .out = out};
+    pick_job job = {.from = bytes, .row = (size_t)out->width, .step = 1, .out = out};
     parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
 }
 
@@ -135,16 +164,41 @@ static size_t full_bytes(const photos *p, size_t view)
     return 3 * (size_t)camera.width * (size_t)camera.height;
 }
 
+static void drop_full(photos *p, size_t view)
+{
+    unsigned char **const caches[] = {p->full, p->full_valid, p->through};
+    for (int i = 0; i < 3; i++) {
+        mem_free(caches[i][view]);
+        caches[i][view] = NULL;
+    }
+}
+
 static void drop_passing(photos *p)
 {
     if (p->passing == SIZE_MAX)
         return;
-    unsigned char **const caches[] = {p->full, p->full_valid};
-    for (int i = 0; i < 2; i++) {
-        mem_free(caches[i][p->passing]);
-        caches[i][p->passing] = NULL;
-    }
+    drop_full(p, p->passing);
     p->passing = SIZE_MAX;
+}
+
+/* Into p->through, of a photo that lies on black or white: on the other it differs by just that. */
+static gbt_status find_through(photos *p, size_t view, const image *photo, gbt_error *err)
+{
+    scene_view other = p->source->views[view];
+    int width, height, channels;
+    if (other.alpha == SCENE_ALPHA_MASK ||
+        image_probe(other.path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
+        return GBT_OK;
+    other.alpha = other.alpha == SCENE_ALPHA_WHITE ? SCENE_ALPHA_BLACK : SCENE_ALPHA_WHITE;
+    image changed;
+    GBT_TRY(scene_read_photo(&other, photo->width, photo->height, &changed, err));
+    const size_t count = (size_t)photo->width * (size_t)photo->height;
+    unsigned char *through = mem_alloc(count, 1, "photo", err);
+    for (size_t i = 0; through != NULL && i < count; i++)
+        through[i] = to_byte(fabsf(changed.pixels[3 * i] - photo->pixels[3 * i]));
+    image_free(&changed);
+    p->through[view] = through;
+    return through != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
 /* Into p->full. */
@@ -154,12 +208,12 @@ static gbt_status read_into(photos *p, size_t view, gbt_error *err)
     image photo;
     GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo,
                                    &p->full_valid[view], err));
-    const gbt_status status = to_bytes(&photo, &p->full[view], err);
+    gbt_status status = find_through(p, view, &photo, err);
+    if (status == GBT_OK)
+        status = to_bytes(&photo, &p->full[view], err);
     image_free(&photo);
-    if (status != GBT_OK) {
-        mem_free(p->full_valid[view]);
-        p->full_valid[view] = NULL;
-    }
+    if (status != GBT_OK)
+        drop_full(p, view);
     return status;
 }
 
@@ -324,6 +378,43 @@ static bool pick_camera(const gbt_camera *full, const photo_sample *sample, pick
     return gbt_camera_cropped(full, from->first[0], from->first[1], width, height, camera);
 }
 
+/* Pixels of p->full. */
+static void pick_pixels(const photos *p, size_t view, int full_width, const pick *from, const float *backdrop,
+                        image *out)
+{
+    pick_job job = {.from = p->full[view],
+                    .through = backdrop != NULL ? p->through[view] : NULL,
+                    .first = (size_t)from->first[1] * (size_t)full_width + (size_t)from->first[0],
+                    .row = (size_t)full_width,
+                    .step = (size_t)from->step,
+                    .out = out};
+    const float behind = p->source->views[view].alpha == SCENE_ALPHA_WHITE;
+    for (int c = 0; c < 3 && backdrop != NULL; c++)
+        job.change[c] = backdrop[c] - behind;
+    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
+}
+
+/* A whole photo at a level, on a colour of its own: made anew each time. */
+static gbt_status get_laid_on(photos *p, size_t view, int level, const float *backdrop, image *out,
+                              gbt_error *err)
+{
+    const gbt_camera full = photos_camera(p, view, 0), camera = photos_camera(p, view, level);
+    GBT_TRY(read_full(p, view, err));
+    if (p->through[view] == NULL)
+        return GBT_OK;
+    image whole = {0};
+    GBT_TRY(image_fit(&whole, full.width, full.height, 3, err));
+    pick_pixels(p, view, full.width, &(pick){.step = 1}, backdrop, &whole);
+    image_free(out);
+    if (level == 0) {
+        *out = whole;
+        return GBT_OK;
+    }
+    const gbt_status status = photo_resize(&whole, camera.width, camera.height, out, err);
+    image_free(&whole);
+    return status;
+}
+
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
                              gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err)
 {
@@ -334,16 +425,12 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
         *step = 1;
         GBT_TRY(photos_get(p, view, sample->level, out, err));
         *valid = photos_valid(p, view);
-        return GBT_OK;
+        return sample->backdrop != NULL ? get_laid_on(p, view, sample->level, sample->backdrop, out, err)
+                                        : GBT_OK;
     }
     *step = from.step;
     GBT_TRY(read_full(p, view, err));
     GBT_TRY(image_fit(out, from.width, from.height, 3, err));
-    const size_t row = 3 * (size_t)full.width;
-    pick_job job = {.from = p->full[view] + (size_t)from.first[1] * row + 3 * (size_t)from.first[0],
-                    .row = row,
-                    .step = (size_t)from.step,
-                    .out = out};
-    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
+    pick_pixels(p, view, full.width, &from, sample->backdrop, out);
     return pick_valid(p, view, full.width, &from, valid, err);
 }

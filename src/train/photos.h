@@ -21,6 +21,8 @@ typedef struct photos {
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
     unsigned char **full_valid,
         **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
+    unsigned char **through; /* [view_count] how transparent each pixel at level 0 is, 255: wholly; NULL for a
+                                photo without an alpha channel, or whose alpha channel is a mask */
     unsigned char *sample_valid; /* of the last photos_get_sample(), when it picked pixels */
     size_t sample_valid_capacity;
 } photos;
@@ -28,15 +30,16 @@ typedef struct photos {
 /** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`
     on; or at level 0 one of parts x parts equal parts. {0}: all. */
 typedef struct photo_sample {
-    int level;    /* >= 0 */
-    int phase[2]; /* x, y, [0, 2^level) */
-    int parts;    /* 0 and 1: whole */
-    int part[2];  /* x, y, [0, parts) */
+    int level;             /* >= 0 */
+    int phase[2];          /* x, y, [0, 2^level) */
+    int parts;             /* 0 and 1: whole */
+    int part[2];           /* x, y, [0, parts) */
+    const float *backdrop; /* [3]: a colour behind what is transparent; NULL: that of scene_view.alpha */
 } photo_sample;
 
-/** By which the photos of a scene are divided where nobody says: the median one becomes 1,600 pixels wide, if
-    it is wider. */
-double photos_usual_downscale(const scene *s);
+/** By which the cameras of a scene are divided where nobody says: to the size of their photos if these are
+    smaller, and if `limits_width` the median one to 1,600 pixels, if it is wider. Cost: opens every photo. */
+double photos_usual_downscale(const scene *s, bool limits_width);
 
 /** `downscale` 0 is 1. */
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);

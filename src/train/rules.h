@@ -25,7 +25,7 @@ typedef struct train_rules {
     bool recentres;              /* local coordinates begin in the middle of the points; else the cells of
                                     voxels and of growth are where the world's coordinates put them */
     float near_depth;            /* scene units: nothing nearer, where uses_near does not say */
-    bool limits_width;           /* photos_usual_downscale(), where nobody says */
+    bool limits_width;           /* of photos_usual_downscale() */
     bool finds_exposure;         /* exposure is learned where photos differ in it */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
     bool limits_first_scale;     /* an isolated point would start as a floater */
@@ -52,8 +52,8 @@ typedef struct train_rules {
                               SCHEDULE_EXACT_FROM */
     double raises_until;   /* progress until which the opacities of an offset that is below 0 in the
                               mean are raised */
-    double opaque_from;    /* progress from which each view of a step has a background of another
-                              colour, so that surfaces become opaque; HUGE_VAL: never */
+    double opaque_from;    /* progress from which half of the views have a random background, so that
+                              surfaces become opaque; HUGE_VAL: never */
     bool own_rates;        /* higher learning rates, that fall to nothing in the end */
     double geometry_from;  /* progress from which offsets and scales learn, and anchors may grow
                               and be pruned */

@@ -81,8 +81,8 @@ double schedule_rate_end(double steps);
 #define SCHEDULE_ALPHA_MIN 0.02f
 #define SCHEDULE_T_MIN 0.003f
 
-/** From then on the background of each step is a colour of its own (rules.opaque_from). Before, while anchors
-   grow, a surface may let it through, which costs fewer Gaussians and fewer hits. */
+/** From then on half of the views that steps look at have a random background (rules.opaque_from). Before,
+   while anchors grow, a surface may let it through, which costs fewer Gaussians and fewer hits. */
 #define SCHEDULE_OPAQUE_FROM 0.5
 
 /**

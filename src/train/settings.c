@@ -53,8 +53,8 @@ static const gbt_train_setting settings[] = {
     {NAMED("pace", pace), .kind = GBT_SETTING_TEXT, .unit = "N1,...,N20", .saved = true, .rare = true,
      .help = "repeat a run with a budget bit for bit: the pace recorded in its train.json"},
     {NAMED("downscale", downscale), RANGE(DOUBLE, 1, 64, "F"), .or_zero = true, .number = 0, .saved = true,
-     .help =
-         "divide the photos' width and height by this; 0: photos wider than 1,600 pixels become that wide",
+     .help = "divide the cameras' width and height by this; 0: to the photos' own size, at most 1,600 pixels "
+             "wide",
      .aliases = "d r resolution data-factor"},
     {NAMED("renderer", renderer), CHOICE(GBT_RENDERER_TRAINING_NAMES), .number = GBT_RENDERER_TRACE,
      .saved = true, .rare = true,

@@ -178,13 +178,12 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
-    const bool known = scene_background(&t->scene, t->settings.background);
-    if (!known && t->rules.background_from_points) {
+    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points) {
         if (t->scene.points.has_color)
             mean_color(&t->scene.points, t->settings.background);
         t->settings.sky.varies = t->def.background == GBT_BACKGROUND_SKY;
     }
-    if (known || t->settings.sky.varies) /* it is what the photos show */
+    if (t->settings.sky.varies) /* it is what the photos show */
         t->rules.opaque_from = HUGE_VAL;
 
     if (def->pace != NULL)

@@ -124,16 +124,18 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
-/* What photos are divided by, where that was left open. */
+/* What cameras are divided by, where that was left open. */
 static void choose_downscale(trainer *t)
 {
     if (t->def.downscale > 0)
         return;
-    t->def.downscale = t->rules.limits_width ? photos_usual_downscale(&t->scene) : 1;
+    t->def.downscale = photos_usual_downscale(&t->scene, t->rules.limits_width);
     if (t->def.downscale > 1)
-        log_info("%s: photos are trained on %.0f pixels wide, divided by %.4g (downscale 1: as they are)",
-                 t->scene.folder, t->scene.views[t->train_views[0]].camera.width / t->def.downscale,
-                 t->def.downscale);
+        log_info(
+            "%s: photos are trained on %.0f pixels wide, the %d of their cameras divided by %.4g (downscale "
+            "says otherwise)",
+            t->scene.folder, t->scene.views[t->train_views[0]].camera.width / t->def.downscale,
+            t->scene.views[t->train_views[0]].camera.width, t->def.downscale);
 }
 
 /* Before any work: a limit that cannot be kept. */

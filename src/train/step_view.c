@@ -82,16 +82,26 @@ static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot, u
     return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
 }
 
-/* Late in a run another colour for each view of a step: only what hides it is right on all of them. */
-static void pick_background(const trainer *t, uint64_t before, float out[3])
+/* Late in a run every second view of a step has another colour behind it: only what hides it is right on all
+   of them. True where it is another. */
+static bool pick_background(const trainer *t, uint64_t before, float out[3])
 {
     uint32_t words[4];
     memcpy(out, t->settings.background, sizeof t->settings.background);
     if (pace_progress(&t->pace, t->step) < t->rules.opaque_from)
-        return;
+        return false;
     rng_philox(t->def.seed, STREAM_BACKGROUND, before, words);
+    if (words[3] >> 31 != 0) /* at random: photos come in turn */
+        return false;
     for (int c = 0; c < 3; c++)
         out[c] = rng_unit(words[c]);
+    return true;
+}
+
+/* The matrix by which a photo's exposure shows the scene, NULL: as it is. */
+static const float *exposure_of(const trainer *t, size_t slot)
+{
+    return t->exposures.count > 0 ? t->exposures.matrix + slot * AFFINE_NUMBERS : NULL;
 }
 
 void step_photos_pick(trainer *t)
@@ -106,10 +116,18 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     const step_size size = size_of_step(t, view);
     v->outcome.level = size.level;
     v->outcome.parts = size.parts;
-    const photo_sample sample = pick_pixels(t, size, v->slot, before);
+    photo_sample sample = pick_pixels(t, size, v->slot, before);
+    float backdrop[3];
+    if (pick_background(t, before, v->background)) {
+        memcpy(backdrop, v->background, sizeof backdrop);
+        if (exposure_of(t, v->slot) != NULL) { /* it is seen through that, too */
+            image pixel = {.width = 1, .height = 1, .channels = 3, .pixels = backdrop};
+            affine_apply(exposure_of(t, v->slot), &pixel, &pixel);
+        }
+        sample.backdrop = backdrop;
+    }
     GBT_TRY(photos_get_sample(&t->photos, view, &sample, &v->photo, &v->camera, &v->valid,
                               &v->frame.draw.pixel_step, err));
-    pick_background(t, before, v->background);
     v->outcome.width = v->camera.width;
     v->outcome.height = v->camera.height;
     if (v->valid == NULL || t->view_count == 1)
@@ -193,8 +211,7 @@ static gbt_status compare(const trainer *t, step_view *v, image_loss_result *los
 {
     const unsigned char *valid;
     GBT_TRY(frame_valid(&v->frame, v->valid, &valid, err));
-    const float *matrix = t->exposures.count > 0 ? t->exposures.matrix + v->slot * AFFINE_NUMBERS : NULL;
-    return step_view_compare(v, valid, matrix, loss, v->outcome.d_exposure, err);
+    return step_view_compare(v, valid, exposure_of(t, v->slot), loss, v->outcome.d_exposure, err);
 }
 
 /* ---- and back ---- */

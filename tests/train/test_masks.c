@@ -5,6 +5,7 @@
 
 #include <jansson.h>
 
+#include "data/photo_size.h"
 #include "gbtrace/evaluate.h"
 #include "io/model_file.h"
 #include "quiet.h"
@@ -283,13 +284,68 @@ static void alpha_is_what_it_is_said_to_be(void **state)
         model_free(&m);
         trainer t;
         open_ok(&t, folder, &def);
-        assert_true(t.rules.opaque_from == (cases[i].masked ? SCHEDULE_OPAQUE_FROM : HUGE_VAL));
+        assert_true(t.rules.opaque_from == SCHEDULE_OPAQUE_FROM);
         trainer_free(&t);
     }
     gbt_train_def def = run_def();
     def.alpha = (gbt_alpha)7;
     train_fails(folder, in_root("alpha_7"), &def, GBT_ERR_ARGUMENT,
                 "alpha: 7 (wanted auto, black, white or mask)");
+}
+
+/* Of a whole photo, picked pixels, a part, and a photo whose lens cannot be shifted. */
+static void transparent_parts_lie_on_the_colour_asked_for(void **state)
+{
+    (void)state;
+    const char *folder = in_root("laid");
+    make_tiny_scene(folder);
+    change_photos(folder, cut_out);
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(folder, &split, &s, NULL));
+    const float backdrop[3] = {0.2f, 0.9f, 0.4f};
+    image stored, expected = {0}, got = {0}, small;
+    assert_ok(image_read(s.views[0].path, &stored, NULL));
+    assert_ok(image_alloc(&expected, stored.width, stored.height, 3, NULL));
+    for (int i = 0; i < 3 * stored.width * stored.height; i++) {
+        const float alpha = stored.pixels[4 * (i / 3) + 3];
+        expected.pixels[i] = alpha * stored.pixels[4 * (i / 3) + i % 3] + (1 - alpha) * backdrop[i % 3];
+    }
+    const gbt_camera pinhole = s.views[0].camera;
+    assert_ok(photo_resize(&expected, stored.width / 2, stored.height / 2, &small, NULL));
+    for (int white = 0; white < 2; white++)
+        for (int shape = 0; shape < 5; shape++) {
+            scene_set_alpha(&s, white ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK);
+            s.views[0].camera.model = shape < 3 ? pinhole.model : GBT_CAMERA_EQUIRECTANGULAR;
+            photo_sample sample = {.backdrop = backdrop};
+            sample.level = shape == 1 || shape == 3;
+            sample.phase[0] = shape == 1;
+            sample.parts = shape == 2 ? 2 : 1;
+            sample.part[1] = shape == 2;
+            photos p;
+            assert_ok(photos_open(&p, &s, 1, NULL));
+            gbt_camera camera;
+            const unsigned char *valid;
+            int step;
+            assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, &step, NULL));
+            const image *from = shape == 3 ? &small : &expected;
+            const int apart = shape == 1 ? 2 : 1, x0 = sample.phase[0], y0 = shape == 2 ? 18 : 0;
+            assert_true(got.width == from->width / apart / sample.parts &&
+                        got.height == from->height / apart / sample.parts);
+            for (int y = 0; y < got.height; y++)
+                for (int x = 0; x < got.width; x++)
+                    for (int c = 0; c < 3; c++)
+                        assert_true(
+                            fabsf(got.pixels[3 * (y * got.width + x) + c] -
+                                  from->pixels[3 * ((y * apart + y0) * from->width + x * apart + x0) + c]) <
+                            1.1f / 255);
+            photos_close(&p);
+        }
+    image_free(&stored);
+    image_free(&expected);
+    image_free(&got);
+    image_free(&small);
+    scene_free(&s);
 }
 
 int main(void)
@@ -300,6 +356,7 @@ int main(void)
         cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
+        cmocka_unit_test(transparent_parts_lie_on_the_colour_asked_for),
     };
     return cmocka_run_group_tests_name("masks", tests, make_root, remove_root);
 }

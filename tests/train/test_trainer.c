@@ -1419,11 +1419,20 @@ static void wide_photos_get_a_usual_width(void **state)
     scene_view views[3] = {
         {.camera = {.width = 800}}, {.camera = {.width = 4000}}, {.camera = {.width = 3200}}};
     const scene s = {.views = views, .view_count = 3};
-    assert_true(photos_usual_downscale(&s) == 2);
+    assert_true(photos_usual_downscale(&s, true) == 2 && photos_usual_downscale(&s, false) == 1);
     views[1].camera.width = 1600;
-    assert_true(photos_usual_downscale(&s) == 1);
+    assert_true(photos_usual_downscale(&s, true) == 1);
     views[2].camera.width = 100;
-    assert_true(photos_usual_downscale(&s) == 1);
+    assert_true(photos_usual_downscale(&s, true) == 1);
+    image photo; /* of a smaller copy, whose cameras say the size of the originals */
+    assert_ok(image_alloc(&photo, 20, 15, 3, NULL));
+    for (int i = 0; i < 3; i++) {
+        views[i].path = (char *)in_root("small.png");
+        views[i].camera.width = 100;
+    }
+    assert_ok(image_write(views[0].path, &photo, NULL));
+    image_free(&photo);
+    assert_true(photos_usual_downscale(&s, true) == 5 && photos_usual_downscale(&s, false) == 5);
     trainer t;
     const gbt_train_def def = run_def();
     open_ok(&t, tiny, &def);

@@ -64,24 +64,25 @@ def core_table(runs):
         print(f"| {cores} | " + (f"{measured[cores]:.2f}" if cores in measured else "") + " | " + " | ".join(cells) + " |")
 
 
-# (bytes, floating-point operations) of a step that every implementation needs, in means over the run: K = 2 Gaussians an anchor.
+# (bytes, floating-point operations) of a step of this program, in means over the run: K = 2 Gaussians an anchor.
 def counts_of(r):
     pixels, visible, gaussians, anchors = r["rays_per_step"], r["visible_per_view"], r["gaussians_per_view"], r["anchors_final"]
     rows = min(visible, gaussians / 1.6)  # visible anchors that have Gaussians: 1.5 to 1.8 each in fox, castle and plush
     learned = FEATURES + 3 * OFFSETS + 6
     decode = 2 * (visible * (NETWORK_INPUTS * HIDDEN + HIDDEN * OFFSETS) + rows * (2 * NETWORK_INPUTS * HIDDEN + HIDDEN * 10 * OFFSETS))
     adjoint = 2 * rows * (3 * HIDDEN * (NETWORK_INPUTS + 1) + 3 * HIDDEN * FEATURES + 2 * HIDDEN * 11 * OFFSETS)
-    tape = 4 * (NETWORK_INPUTS + 3 * HIDDEN)
+    again = 2 * rows * 3 * HIDDEN * NETWORK_INPUTS  # hidden layers, which are not kept
+    inputs = 4 * (3 + FEATURES)
     hits = pixels * r["blended_per_ray"]
     return {
         "photo": (15 * pixels, 3 * pixels),
         "rays": (12 * pixels, 20 * pixels),
         "visible": (12 * pixels + 12 * anchors, 30 * pixels + 30 * anchors),
-        "decode": (visible * 4 * (3 + FEATURES) + rows * (tape + 4 * (6 + 3 * OFFSETS)) + 2 * 56 * gaussians, decode),
+        "decode": ((visible + rows) * inputs + rows * 4 * (6 + 3 * OFFSETS) + 2 * 56 * gaussians, decode),
         "trace": (56 * gaussians + 12 * pixels, 70 * hits),
         "loss": (36 * pixels, 3 * 284 * pixels),
         "adjoint": (2 * 56 * gaussians + 24 * pixels, 150 * hits),
-        "decode_adjoint": (rows * (tape + 4 * 2 * learned) + 2 * 56 * gaussians, adjoint),
+        "decode_adjoint": (rows * (inputs + 4 * 2 * learned) + 2 * 56 * gaussians, adjoint + again),
         "optimizer": (4 * 8 * (visible * FEATURES + anchors * (learned - FEATURES)), 14 * (visible * FEATURES + anchors * (learned - FEATURES))),
     }
 

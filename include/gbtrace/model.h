@@ -91,7 +91,7 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 
 /** How pictures are made. */
 typedef struct gbt_model_settings {
-    float background[3]; /* behind everything. Default as trained; black for plain Gaussians. A sky that was
+    float background[3]; /* behind everything. Default the model's; black for plain Gaussians. A sky that was
                             learned is added to it until it is changed */
     float footprint; /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default
                         as trained; 0.1 for plain Gaussians */

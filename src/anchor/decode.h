@@ -46,7 +46,7 @@ typedef struct decode_tape {
  * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters
  * @return GBT_OK, GBT_ERR_ARGUMENT (K of anchors and decoder differ, `visible` not ascending or out of
  *         range), GBT_ERR_NO_MEMORY
- * Threads: same bits for every thread count. Cost (K = 10): 1660 multiply-adds per visible anchor, 5220 more
+ * Threads: same bits for every thread count. Cost (K = 10): 1440 multiply-adds per visible anchor, 5440 more
  * for one with Gaussians.
  */
 gbt_status decode_forward(const anchors *a, const decoder *d, const float camera_center[3],
@@ -56,6 +56,7 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
 /**
  * Adjoint of the last decode_forward() on `tape`: adds dL/dparameter.
  *
+ * @param a, d [in] as decode_forward() was given them, with the same values: hidden layers are computed again
  * @param d_gaussians [in]  gradients in the order of the forward's `out`; quat_* is dL/d(unit quaternion),
  *                          any component along q is ignored
  * @param d_anchors   [out] same shape as `a` (position unused); added to, rows of `visible` only. Or these

@@ -34,8 +34,8 @@ typedef struct backward_job {
     anchors *d_anchors; /* with d_params; NULL: the camera's gradient alone is wanted */
     bool packed;        /* d_anchors has a row for each visible anchor */
     float *d_params;
-    const decoder *d; /* for the camera's gradient: */
-    double *d_camera; /* [block_count][3] */
+    const decoder *d;
+    double *d_camera; /* [block_count][3]; NULL: not wanted */
     size_t block_count;
 } backward_job;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_layout.h -- how decode.c and decode_backward.c lay out rows, heads and packed networks in
-   memory.
+/* anchor/decode_layout.h -- how the files of the decoder lay out rows, heads and packed networks in memory,
+   and what they share.
 
    One row per visible anchor. The visible anchors are cut into chunks of DECODE_CHUNK rows, whose scratch
    stays in the second-level cache; a parallel block is DECODE_GRAIN rows. Both are multiples of the register

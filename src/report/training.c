@@ -145,7 +145,8 @@ static void add_curves(text *out, const curves *c)
          .y_decimals = 2,
          .series = psnr,
          .series_count = 3,
-         .note = "Training photos are scored at the resolution of the moment, held-out views at full size."},
+         .note = "Training photos are scored at the resolution of the moment, from the middle of the run on "
+                 "half of them on a random background; held-out views at full size."},
         {.title = "Anchors and Gaussians",
          .y_unit = "count",
          .from_zero = true,

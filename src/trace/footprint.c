@@ -14,6 +14,8 @@
 #include "base/fail.h"
 #include "base/parallel.h"
 
+#define PI 3.14159265358979323846
+
 enum { LANES = 8, WIDEN_BLOCK = 512 /* a multiple of LANES */ };
 
 typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
@@ -35,8 +37,9 @@ footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *
         return view;
     if (camera_lens_looks_forward(lens))
         view.kind = lens->kind == LENS_ORTHOGRAPHIC ? FOOTPRINT_PARALLEL : FOOTPRINT_PERSPECTIVE;
-    /* Of an equirectangular picture: on its horizon; towards the poles columns are closer. */
     view.pixel = 1 / sqrt(lens->fx * lens->fy);
+    if (lens->kind == LENS_EQUIRECTANGULAR) /* on its horizon; towards the poles columns are closer */
+        view.pixel *= sqrt(2) * PI;         /* fx pixels go round, fy half round */
     return view;
 }
 

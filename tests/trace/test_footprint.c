@@ -73,6 +73,11 @@ static void test_sizes(void **state)
     c.params[0] = NAN;
     view = footprint_view_of(&c);
     assert_true(footprint_pixel(&view, (double[]){0, 0, 1}) == 0);
+    c = camera_of(GBT_CAMERA_EQUIRECTANGULAR);
+    c.params[0] = c.width = 200; /* as a picture of 200 x 100: a pixel is 1.8 degrees wide and high */
+    c.params[1] = c.height = 100;
+    view = footprint_view_of(&c);
+    assert_true(fabs(footprint_pixel(&view, (double[]){0.3, 3.8, -6}) - 4 * acos(-1.0) / 100) < 1e-12);
 }
 
 /* A ball of std-dev s on the axis keeps o s^2; a disc seen flat keeps its area, seen edge-on only its width

@@ -38,8 +38,11 @@ footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *
     if (camera_lens_looks_forward(lens))
         view.kind = lens->kind == LENS_ORTHOGRAPHIC ? FOOTPRINT_PARALLEL : FOOTPRINT_PERSPECTIVE;
     view.pixel = 1 / sqrt(lens->fx * lens->fy);
-    if (lens->kind == LENS_EQUIRECTANGULAR) /* on its horizon; towards the poles columns are closer */
-        view.pixel *= sqrt(2) * PI;         /* fx pixels go round, fy half round */
+    if (lens->kind == LENS_EQUIRECTANGULAR) {
+        view.kind = FOOTPRINT_PANORAMA;
+        view.pixel *= sqrt(2) * PI; /* fx pixels go round, fy half round */
+        memcpy(view.axis, camera->rotation + 3, sizeof view.axis);
+    }
     return view;
 }
 
@@ -91,7 +94,8 @@ LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
 
 /* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle
    theta from the axis has the solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t
-   cos(theta). */
+   cos(theta). Of a panorama columns are closer above and below: a pixel at the latitude phi has cos(phi)
+   times the solid angle of one on the horizon, so p = p_0 t cos^(1/2)(phi). */
 LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_point[3])
 {
     const d8 pixel = d8_set(view->pixel), none = d8_set(0);
@@ -106,6 +110,13 @@ LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_po
     }
     const d8 axis[3] = {d8_set(view->axis[0]), d8_set(view->axis[1]), d8_set(view->axis[2])},
              cosine = d8_dot(dir, axis);
+    if (view->kind == FOOTPRINT_PANORAMA) {
+        const d8 square = 1 - cosine * cosine, level = d8_sqrt(d8_select(square > 0, square, none)),
+                 root = d8_sqrt(level);
+        for (int k = 0; k < 3; k++)
+            d_point[k] = 0.5 * pixel * (root * dir[k] + d8_over(dir[k] - cosine * axis[k], level * root));
+        return pixel * t * root;
+    }
     const d8 ahead = d8_select(cosine > 0, cosine, none), root = d8_sqrt(ahead);
     for (int k = 0; k < 3; k++)
         d_point[k] = pixel * (1.5 * root * axis[k] - 0.5 * root * ahead * dir[k]);

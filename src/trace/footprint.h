@@ -19,10 +19,15 @@
 
 /** How a view samples the scene. */
 typedef struct footprint_view {
-    enum footprint_kind { FOOTPRINT_PERSPECTIVE, FOOTPRINT_ANGULAR, FOOTPRINT_PARALLEL } kind;
-    double center[3], axis[3]; /* of the camera; axis: forward, unit */
-    double pixel; /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular); at any
-                     distance (parallel) */
+    enum footprint_kind {
+        FOOTPRINT_PERSPECTIVE,
+        FOOTPRINT_ANGULAR,
+        FOOTPRINT_PANORAMA,
+        FOOTPRINT_PARALLEL
+    } kind;
+    double center[3], axis[3]; /* of the camera; axis: forward, or down for a panorama; unit */
+    double pixel; /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular), on the
+                     horizon (panorama); at any distance (parallel) */
 } footprint_view;
 
 /** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size

@@ -77,7 +77,14 @@ static void test_sizes(void **state)
     c.params[0] = c.width = 200; /* as a picture of 200 x 100: a pixel is 1.8 degrees wide and high */
     c.params[1] = c.height = 100;
     view = footprint_view_of(&c);
-    assert_true(fabs(footprint_pixel(&view, (double[]){0.3, 3.8, -6}) - 4 * acos(-1.0) / 100) < 1e-12);
+    const double *down = c.rotation + 3, *ahead = c.rotation + 6;
+    for (int degrees = -90; degrees <= 90; degrees += 30) { /* of latitude: columns are closer */
+        const double angle = degrees * acos(-1.0) / 180, level = fmax(cos(angle), 0);
+        double at[3];
+        for (int k = 0; k < 3; k++)
+            at[k] = c.center[k] + 4 * (level * ahead[k] + sin(angle) * down[k]);
+        assert_true(fabs(footprint_pixel(&view, at) - 4 * acos(-1.0) / 100 * sqrt(level)) < 1e-7);
+    }
 }
 
 /* A ball of std-dev s on the axis keeps o s^2; a disc seen flat keeps its area, seen edge-on only its width

@@ -125,6 +125,9 @@ gbt_status resume_open(trainer *t, const char *data, const char *run, const char
     GBT_TRY(train_def_check(def, err));
     GBT_TRY(find_checkpoint(latest, previous, &path, config, err));
     gbt_train_def saved = *def;
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) /* it says nothing of some that it left alone */
+        if (gbt_train_setting_at(i)->saved)
+            setting_set_default(gbt_train_setting_at(i), &saved);
     GBT_TRY(config_parse(config, path, &saved, strings, err));
     warn_of_differences(def, &saved);
     GBT_TRY(open_data(t, data, run, &saved, strings->data, err));

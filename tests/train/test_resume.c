@@ -218,6 +218,36 @@ static void a_learned_sky_goes_on(void **state)
     model_free(&m);
 }
 
+static void keep_warnings(const gbt_event *event, void *context)
+{
+    char *kept = context;
+    if (event->kind == GBT_EVENT_WARNING)
+        snprintf(kept + strlen(kept), PATH_SIZE - strlen(kept), "%s\n", event->text);
+}
+
+/* Neither is in the file of a run that left it alone. */
+static void what_a_run_left_alone_stays(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    train_ok(tiny, in_root("plain"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    gbt_train_def on = resume_def(STEPS, 0);
+    on.views = 4;
+    on.background = GBT_BACKGROUND_SKY;
+    on.refine_poses = true;
+    char warnings[PATH_SIZE] = "";
+    gbt_listen(keep_warnings, warnings);
+    train_ok(tiny, in_root("asked"), &on);
+    be_quiet();
+    assert_string_equal(warnings,
+                        "a run is resumed with its own settings: views = 1, not 4\n"
+                        "a run is resumed with its own settings: background = constant, not sky\n"
+                        "a run is resumed with its own settings: refine-poses = 0, not 1\n");
+    assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
+}
+
 int main(void)
 {
     be_quiet();
@@ -226,6 +256,7 @@ int main(void)
         cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
         cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
         cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
+        cmocka_unit_test(what_a_run_left_alone_stays),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
 }

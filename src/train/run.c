@@ -16,6 +16,7 @@
 #include "train/align.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/old_run.h"
 #include "train/pose_file.h"
 #include "train/resume.h"
 #include "train/run_data.h"
@@ -278,7 +279,10 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
     GBT_TRY(cluster_agree(saving != NULL ? GBT_OK : GBT_ERR_NO_MEMORY, err));
     if (cluster_leads()) {
-        status = write_settings(t, run, paths, err);
+        if (def->overwrite)
+            status = old_run_remove(run, err);
+        if (status == GBT_OK)
+            status = write_settings(t, run, paths, err);
         if (status == GBT_OK)
             status = run_log_open(&log, t, paths->log, paths->events, err);
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/train/test_resume.c -- going on: a finished run to another length, the run's own data, what is
-   refused. */
+   refused; a run that was overwritten does not come back. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -248,6 +248,43 @@ static void what_a_run_left_alone_stays(void **state)
     assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
 }
 
+static void write_file(const char *path)
+{
+    assert_ok(file_write_atomic(path, "old", 3, NULL));
+}
+
+/* However the new run ends: here, before its first checkpoint. */
+static void an_overwritten_run_is_gone(void **state)
+{
+    (void)state;
+    static const char *const old[] = {"checkpoints/last.gbt", "checkpoints/last.gbt.prev",
+                                      "model.gbt",            "poses.json",
+                                      "exposure.json",        "train.json",
+                                      "metrics.json",         "report.html",
+                                      "renders/test/0.png",   "events.out.tfevents.0.train"};
+    enum { OLD = sizeof old / sizeof *old };
+    gbt_train_def def = run_def(), on = resume_def(0, 0);
+    def.refine_poses = true;
+    train_ok(tiny, in_root("lost"), &def);
+    assert_ok(file_make_folder(in_root("lost/renders/test"), NULL));
+    for (int i = 0; i < OLD; i++)
+        if (!file_exists(in_root("lost/%s", old[i])))
+            write_file(in_root("lost/%s", old[i]));
+    write_file(in_root("lost/notes.txt"));
+    def = run_def();
+    def.overwrite = true;
+    train_fails(in_root("no data"), in_root("lost"), &def, GBT_ERR_IO, "no data");
+    for (int i = 0; i < OLD; i++)
+        assert_true(file_exists(in_root("lost/%s", old[i])));
+    assert_int_equal(remove(in_root("lost/log.csv")), 0); /* cannot be written where a folder is */
+    assert_ok(file_make_folder(in_root("lost/log.csv"), NULL));
+    train_fails(tiny, in_root("lost"), &def, GBT_ERR_IO, "log.csv");
+    for (int i = 0; i < OLD; i++)
+        assert_false(file_exists(in_root("lost/%s", old[i])));
+    assert_true(file_exists(in_root("lost/notes.txt")));
+    train_fails(tiny, in_root("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+}
+
 int main(void)
 {
     be_quiet();
@@ -256,7 +293,7 @@ int main(void)
         cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
         cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
         cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
-        cmocka_unit_test(what_a_run_left_alone_stays),
+        cmocka_unit_test(what_a_run_left_alone_stays),  cmocka_unit_test(an_overwritten_run_is_gone),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
 }

@@ -21,6 +21,7 @@
 #include "train/resume.h"
 #include "train/run_data.h"
 #include "train/run_log.h"
+#include "train/run_split.h"
 #include "train/save.h"
 #include "train/step_size.h"
 #include "train/trainer.h"
@@ -252,8 +253,13 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
 
 static gbt_status write_settings(const trainer *t, const char *run, const run_paths *paths, gbt_error *err)
 {
-    char config[CONFIG_TEXT_SIZE];
-    config_text(&t->def, t->scene.folder, config, sizeof config);
+    char config[CONFIG_TEXT_SIZE], split[RUN_SPLIT_TEXT_SIZE];
+    gbt_train_def def = t->def;
+    GBT_TRY(run_split_save(run, &t->scene, err));
+    GBT_TRY(run_split_text(run, def.eval_split, split, err));
+    if (strlen(split) < SETTING_TEXT_SIZE)
+        def.eval_split = split;
+    config_text(&def, t->scene.folder, config, sizeof config);
     GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
     return run_data_save(run, t->scene.folder, err);
 }

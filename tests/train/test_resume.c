@@ -248,9 +248,38 @@ static void what_a_run_left_alone_stays(void **state)
     assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
 }
 
-static void write_file(const char *path)
+static void write_text(const char *path, const char *text)
 {
-    assert_ok(file_write_atomic(path, "old", 3, NULL));
+    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
+}
+
+/* What becomes of the list that was named, and where the run is gone on with, decides nothing. */
+static void a_list_of_held_out_photos_is_the_runs_own(void **state)
+{
+    (void)state;
+    char split[PATH_SIZE], wanted[PATH_SIZE];
+    snprintf(split, sizeof split, "validate=3,list=%s", in_root("held.txt"));
+    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_root("list/held-out.txt"));
+    write_text(in_root("held.txt"), "0001.png\r\n\n0004.png");
+    gbt_train_def def = run_def();
+    def.eval_split = split;
+    train_ok(tiny, in_root("list straight"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
+    write_text(in_root("held.txt"), "0002.png\n");
+    const gbt_train_def on = resume_def(0, 0);
+    train_ok(tiny, in_root("list"), &on);
+    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
+    bytes config = read_bytes(in_root("list/config"));
+    assert_non_null(strstr((const char *)config.data, wanted));
+    mem_free(config.data);
+    /* A run of an older version has none. */
+    assert_int_equal(remove(in_root("list/held-out.txt")), 0);
+    write_text(in_root("held.txt"), "0001.png\n0004.png\n");
+    train_ok(tiny, in_root("list"), &on);
+    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
+    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
 }
 
 /* However the new run ends: here, before its first checkpoint. */
@@ -269,8 +298,8 @@ static void an_overwritten_run_is_gone(void **state)
     assert_ok(file_make_folder(in_root("lost/renders/test"), NULL));
     for (int i = 0; i < OLD; i++)
         if (!file_exists(in_root("lost/%s", old[i])))
-            write_file(in_root("lost/%s", old[i]));
-    write_file(in_root("lost/notes.txt"));
+            write_text(in_root("lost/%s", old[i]), "old");
+    write_text(in_root("lost/notes.txt"), "old");
     def = run_def();
     def.overwrite = true;
     train_fails(in_root("no data"), in_root("lost"), &def, GBT_ERR_IO, "no data");
@@ -294,6 +323,7 @@ int main(void)
         cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
         cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
         cmocka_unit_test(what_a_run_left_alone_stays),  cmocka_unit_test(an_overwritten_run_is_gone),
+        cmocka_unit_test(a_list_of_held_out_photos_is_the_runs_own),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
 }

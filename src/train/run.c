@@ -120,8 +120,6 @@ static void pace_extend(trainer *t, const speed *s)
 static gbt_status finish_poses(trainer *t, gbt_error *err)
 {
     double angle, distance;
-    if (t->poses.count == 0)
-        return GBT_OK;
     GBT_TRY(align_held_out(t, err));
     GBT_TRY(poses_moved(&t->poses, &t->scene, t->train_views, t->train_count, &angle, &distance, err));
     log_info("%s: poses moved by %.2g degrees and %.2g scene units (the median photo); %zu held-out photos "
@@ -264,14 +262,21 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
     return run_data_save(run, t->scene.folder, err);
 }
 
+/* All is saved before held-out photos are aligned, which takes its time and can be stopped. */
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
     GBT_TRY(save_finish(saving, err));
-    GBT_TRY(finish_poses(t, err));
     GBT_TRY(save_all(t, paths, err));
-    return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)
-               ? run_log_summary(log, t, paths->json, err)
+    if (log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step))
+        GBT_TRY(run_log_summary(log, t, paths->json, err));
+    if (t->poses.count > 0) {
+        GBT_TRY(finish_poses(t, err));
+        GBT_TRY(save_all(t, paths, err));
+    }
+    return stop_signal_seen()
+               ? base_fail(err, GBT_ERR_INTERRUPTED, "stopped after the last step; saved in %s (resume goes on)",
+                           paths->checkpoint)
                : GBT_OK;
 }
 

@@ -162,11 +162,31 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+/* How long the run is; a budget decides as it goes on. A run that is resumed has what it has. */
+static gbt_status take_length(trainer *t, gbt_error *err)
+{
+    gbt_train_def *def = &t->def;
+    if (def->pace == NULL) {
+        if (def->iterations > 0)
+            t->pace = pace_of_iterations(def->iterations);
+        return GBT_OK;
+    }
+    GBT_TRY(pace_parse(def->pace, &t->pace, err));
+    if (!def->resume && def->iterations > 0 && def->iterations != pace_total(&t->pace))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "iterations: %llu (wanted the %llu of `pace` in all, or only one of the two)",
+                         (unsigned long long)def->iterations, (unsigned long long)pace_total(&t->pace));
+    pace_text(&t->pace, t->pace_words);
+    def->pace = t->pace_words;
+    return GBT_OK;
+}
+
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err)
 {
     GBT_TRY(train_def_check(def, err));
     t->def = *def;
     train_def_settle(&t->def);
+    GBT_TRY(take_length(t, err));
     t->rules = train_rules_of(&t->def);
     if (t->def.views % gbt_cluster_size() != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
@@ -185,10 +205,5 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     }
     if (t->settings.sky.varies) /* it is what the photos show */
         t->rules.opaque_from = HUGE_VAL;
-
-    if (def->pace != NULL)
-        GBT_TRY(pace_parse(def->pace, &t->pace, err));
-    else if (def->iterations > 0)
-        t->pace = pace_of_iterations(def->iterations);
     return GBT_OK;
 }

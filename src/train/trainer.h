@@ -64,6 +64,7 @@ struct trainer {
     char start_text[160]; /* what the run starts from, for people */
 
     pace pace;
+    char pace_words[PACE_TEXT_SIZE]; /* def.pace, where there is one: as files have it */
     uint64_t step;       /* steps done */
     uint64_t round_step; /* steps done at the last round of growth */
     uint64_t anchor_t;   /* Adam steps of the per-anchor groups */

@@ -162,6 +162,22 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+static void choose_background(trainer *t)
+{
+    const bool given = scene_background(&t->scene, t->settings.background),
+               wants_sky = t->def.background == GBT_BACKGROUND_SKY;
+    if (!given && t->rules.background_from_points) {
+        if (t->scene.points.has_color)
+            mean_color(&t->scene.points, t->settings.background);
+        t->settings.sky.varies = wants_sky;
+    }
+    if (t->settings.sky.varies) /* it is what the photos show */
+        t->rules.opaque_from = HUGE_VAL;
+    else if (wants_sky)
+        log_warn("%s: no sky is learned: %s", t->scene.folder,
+                 given ? "photos with an alpha channel lie on one colour" : "compat has one colour");
+}
+
 /* How long the run is; a budget decides as it goes on. A run that is resumed has what it has. */
 static gbt_status take_length(trainer *t, gbt_error *err)
 {
@@ -198,12 +214,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
-    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points) {
-        if (t->scene.points.has_color)
-            mean_color(&t->scene.points, t->settings.background);
-        t->settings.sky.varies = t->def.background == GBT_BACKGROUND_SKY;
-    }
-    if (t->settings.sky.varies) /* it is what the photos show */
-        t->rules.opaque_from = HUGE_VAL;
+    choose_background(t);
     return GBT_OK;
 }

@@ -12,6 +12,7 @@
 #include "bvh/points.h"
 #include "gbtrace/cluster.h"
 #include "train/camera_sees.h"
+#include "train/config.h"
 #include "train/def.h"
 #include "train/near.h"
 #include "train/setup_data.h"
@@ -203,6 +204,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->def = *def;
     train_def_settle(&t->def);
     GBT_TRY(take_length(t, err));
+    GBT_TRY(config_check(&t->def, data, err));
     t->rules = train_rules_of(&t->def);
     if (t->def.views % gbt_cluster_size() != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,

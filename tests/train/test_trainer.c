@@ -727,6 +727,16 @@ static void data_without_training_photos_is_refused(void **state)
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
     train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
+    char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
+    snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
+    make_tiny_scene(two_lines); /* no run could be opened again that names this */
+    train_fails(two_lines, in_root("none"), &def, GBT_ERR_ARGUMENT, "data: has a line break");
+    memset(long_name, 'x', 2 * PATH_SIZE);
+    long_name[2 * PATH_SIZE] = '\0';
+    train_fails(long_name, in_root("none"), &def, GBT_ERR_ARGUMENT, "1024 bytes (wanted at most 1023)");
+    def.eval_split = "list=two\nlines";
+    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "eval_split: has a line break");
+    def = run_def();
     def.cookie_ = 0;
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "gbt_train_def_default");
     assert_false(file_exists(in_root("none/model.gbt")));

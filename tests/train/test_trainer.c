@@ -1022,10 +1022,17 @@ static void pace_is_read(void **state)
     (void)state;
     pace p;
     gbt_error err = {0};
-    assert_ok(pace_parse("1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", &p, &err));
-    assert_int_equal(p.known, PACE_SEGMENTS);
-    for (int i = 0; i < PACE_SEGMENTS; i++)
-        assert_int_equal(p.steps[i], i + 1);
+    static const char *const good[] = {
+        "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+        "1, 2,3 ,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20 ",
+        "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20]",
+        "[\n    1,\n    2,\n3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,\n    20\n  ]\n"};
+    for (size_t k = 0; k < sizeof good / sizeof *good; k++) {
+        assert_ok(pace_parse(good[k], &p, &err));
+        assert_int_equal(p.known, PACE_SEGMENTS);
+        for (int i = 0; i < PACE_SEGMENTS; i++)
+            assert_int_equal(p.steps[i], i + 1);
+    }
     static const char *const bad[] = {"",
                                       "1",
                                       "1,2",
@@ -1033,7 +1040,12 @@ static void pace_is_read(void **state)
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x",
                                       "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
-                                      "1, 2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20]",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20]]",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19]",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20 1",
+                                      "[", "[]", " ",
                                       "1,,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
                                       "1.5,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,99999999999999999999"};
@@ -1053,6 +1065,10 @@ static void pace_is_read(void **state)
     def.iterations = 210;
     open_ok(&t, tiny, &def);
     assert_int_equal(t.pace.steps[19], 20);
+    trainer_free(&t);
+    def.pace = good[3];
+    open_ok(&t, tiny, &def);
+    assert_string_equal(t.def.pace, good[0]); /* which the files of the run say */
     trainer_free(&t);
 }
 

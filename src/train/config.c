@@ -13,8 +13,8 @@ static gbt_status check_value(const char *field, const char *value, gbt_error *e
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: has a line break (wanted one line, as the files of a run keep it)", field);
     if (strlen(value) >= SETTING_TEXT_SIZE)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: \"%.60s...\": %zu bytes (wanted at most %d)", field, value,
-                         strlen(value), SETTING_TEXT_SIZE - 1);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: \"%.60s...\": %zu bytes (wanted at most %d)", field,
+                         value, strlen(value), SETTING_TEXT_SIZE - 1);
     return GBT_OK;
 }
 
@@ -23,7 +23,8 @@ gbt_status config_check(const gbt_train_def *def, const char *data, gbt_error *e
     GBT_TRY(check_value("data", data, err));
     for (size_t i = 0; i < gbt_train_setting_count(); i++) {
         const gbt_train_setting *s = gbt_train_setting_at(i);
-        const char *text = s->kind == GBT_SETTING_TEXT ? *(const char *const *)((const char *)def + s->offset) : NULL;
+        const char *text =
+            s->kind == GBT_SETTING_TEXT ? *(const char *const *)((const char *)def + s->offset) : NULL;
         if (text != NULL)
             GBT_TRY(check_value(s->field, text, err));
     }

@@ -275,8 +275,8 @@ static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving
         GBT_TRY(save_all(t, paths, err));
     }
     return stop_signal_seen()
-               ? base_fail(err, GBT_ERR_INTERRUPTED, "stopped after the last step; saved in %s (resume goes on)",
-                           paths->checkpoint)
+               ? base_fail(err, GBT_ERR_INTERRUPTED,
+                           "stopped after the last step; saved in %s (resume goes on)", paths->checkpoint)
                : GBT_OK;
 }
 

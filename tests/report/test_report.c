@@ -614,8 +614,7 @@ static void a_resumed_run_is_made_again(void **state)
     write_log(5, "");
     evaluation e = make_views(1);
     json_t *metrics = full_metrics();
-    json_object_set_new(metrics, "command",
-                        json_string("gbtrace train -o run --resume --pace 1,2 --quiet"));
+    json_object_set_new(metrics, "command", json_string("gbtrace train -o run --resume --pace 1,2 --quiet"));
     char *page = write_report(&e, metrics), wanted[VIEW_PATH_SIZE];
     snprintf(wanted, sizeof wanted, ">gbtrace train --config %s/config -o NEW --pace 333,333,334</pre>",
              folder);

@@ -241,10 +241,9 @@ static void what_a_run_left_alone_stays(void **state)
     gbt_listen(keep_warnings, warnings);
     train_ok(tiny, in_root("asked"), &on);
     be_quiet();
-    assert_string_equal(warnings,
-                        "a run is resumed with its own settings: views = 1, not 4\n"
-                        "a run is resumed with its own settings: background = constant, not sky\n"
-                        "a run is resumed with its own settings: refine-poses = 0, not 1\n");
+    assert_string_equal(warnings, "a run is resumed with its own settings: views = 1, not 4\n"
+                                  "a run is resumed with its own settings: background = constant, not sky\n"
+                                  "a run is resumed with its own settings: refine-poses = 0, not 1\n");
     assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
 }
 
@@ -286,11 +285,16 @@ static void a_list_of_held_out_photos_is_the_runs_own(void **state)
 static void an_overwritten_run_is_gone(void **state)
 {
     (void)state;
-    static const char *const old[] = {"checkpoints/last.gbt", "checkpoints/last.gbt.prev",
-                                      "model.gbt",            "poses.json",
-                                      "exposure.json",        "train.json",
-                                      "metrics.json",         "report.html",
-                                      "renders/test/0.png",   "events.out.tfevents.0.train"};
+    static const char *const old[] = {"checkpoints/last.gbt",
+                                      "checkpoints/last.gbt.prev",
+                                      "model.gbt",
+                                      "poses.json",
+                                      "exposure.json",
+                                      "train.json",
+                                      "metrics.json",
+                                      "report.html",
+                                      "renders/test/0.png",
+                                      "events.out.tfevents.0.train"};
     enum { OLD = sizeof old / sizeof *old };
     gbt_train_def def = run_def(), on = resume_def(0, 0);
     def.refine_poses = true;
@@ -318,11 +322,16 @@ int main(void)
 {
     be_quiet();
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_finished_run_goes_on),       cmocka_unit_test(the_new_length_decides),
-        cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
-        cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
-        cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
-        cmocka_unit_test(what_a_run_left_alone_stays),  cmocka_unit_test(an_overwritten_run_is_gone),
+        cmocka_unit_test(a_finished_run_goes_on),
+        cmocka_unit_test(the_new_length_decides),
+        cmocka_unit_test(a_run_goes_on_for_a_time),
+        cmocka_unit_test(a_length_that_has_passed_is_refused),
+        cmocka_unit_test(nothing_left_changes_nothing),
+        cmocka_unit_test(the_run_knows_its_data),
+        cmocka_unit_test(other_data_are_refused),
+        cmocka_unit_test(a_learned_sky_goes_on),
+        cmocka_unit_test(what_a_run_left_alone_stays),
+        cmocka_unit_test(an_overwritten_run_is_gone),
         cmocka_unit_test(a_list_of_held_out_photos_is_the_runs_own),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);

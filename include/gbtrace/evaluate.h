@@ -40,7 +40,9 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own
  * data set is gone) nothing in RUN changes: the scores go to stderr, and to the file `json` when it is given.
  *
- * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED: scores and report are as before.
+ *
+ * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 

@@ -30,8 +30,8 @@ typedef struct gbt_train_def {
     double budget_seconds; /* wall time for training, with what was spent before `resume`; used when
                               iterations is 0. 0: 600, or with `resume` as long as the run was to be */
     int views;             /* photos that a step looks at, a power of two up to 64; results depend on it */
-    const char *pace; /* "n1,...,n20": iterations in each twentieth of the schedule, as a budget run records
-                         them; NULL: as the budget allows */
+    const char *pace;      /* "n1,...,n20", or the list in train.json: iterations in each twentieth of the
+                              schedule,      as a budget run records them; NULL: as the budget allows */
     double downscale; /* of the cameras' width and height; 0: to the size of the photos if they are smaller,
                          then to 1,600 pixels if the median photo is wider, but for compat */
     gbt_renderer renderer; /* what the photos are compared with; one that trains */
@@ -80,7 +80,7 @@ typedef struct gbt_train_def {
     bool resume;    /* go on from the run's last checkpoint, with its settings. Other `iterations`, or another
                        budget, give the run another length: schedules go on where a run of that length would
                        be */
-    bool overwrite; /* train anew in a folder that holds a run, which is lost */
+    bool overwrite; /* train anew in a folder that holds a run, which is lost once the data have been read */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
                                                     stops meanwhile */
     int eval_at_count;
@@ -111,7 +111,8 @@ gbt_train_def gbt_train_def_default(void);
  * GBT_ERR_ARGUMENT, other data than the run's GBT_ERR_FORMAT.
  *
  * A folder that holds model.gbt or a checkpoint is refused with GBT_ERR_ARGUMENT before anything is written,
- * unless `resume` or `overwrite` is set.
+ * unless `resume` or `overwrite` is set. With `overwrite` the files of the older run are removed when the new
+ * one has read its data; a failure before leaves them.
  *
  * @return GBT_OK, or what failed; nothing already in `run` is damaged by a failure
  */

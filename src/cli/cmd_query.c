@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_query.c -- gbtrace query. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "cli/options.h"
@@ -62,7 +63,8 @@ static int run(const operands *given)
     while (strcmp(kinds()[kind].name, given->value[0]) != 0)
         kind++;
     def.kind = (gbt_query_kind)kind;
-    return command_failed(gbt_query(given->value[1], &def, stdout, &err), &err);
+    const gbt_status status = gbt_query(given->value[1], &def, stdout, &err);
+    return ferror(stdout) ? 0 : command_failed(status, &err); /* main() says what is wrong with stdout */
 }
 
 const command command_query = {.name = "query",

@@ -29,7 +29,8 @@ static const option own_rows[] = {
     {.name = "lossless",
      .kind = OPTION_FLAG,
      .value = &lossless,
-     .help = "store the model without loss (see compress); the file is about seven times larger",
+     .help = "store the model without loss (see compress); the file is about seven times larger; not kept "
+             "with the run: with --resume it is named again",
      .rare = true},
     {.name = "eval",
      .kind = OPTION_STRING,

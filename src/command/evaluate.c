@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "data/json_out.h"
 #include "eval/score_files.h"
@@ -85,13 +86,13 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     GBT_TRY(def_check(def->cookie_, "gbt_evaluate_def_default", err));
     if (!file_is_folder(run))
         return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
+    stop_signal_guard guard;
+    stop_signal_catch(&guard, NULL, NULL);
     evaluation e = {0};
     lpips *net = NULL;
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
-    if (r == NULL)
-        return GBT_ERR_NO_MEMORY;
     bool own = false;
-    gbt_status status = open_run(run, def, r, &own, err);
+    gbt_status status = r == NULL ? GBT_ERR_NO_MEMORY : open_run(run, def, r, &own, err);
     if (status == GBT_OK && def->lpips != NULL)
         status = lpips_open(def->lpips, &net, err);
     status = cluster_agree(status, err);
@@ -125,7 +126,9 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
                  run);
     lpips_close(net);
     mem_free(e.views);
-    loaded_run_close(r);
+    if (r != NULL)
+        loaded_run_close(r);
     mem_free(r);
+    stop_signal_release(&guard);
     return status;
 }

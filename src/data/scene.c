@@ -396,6 +396,7 @@ void scene_free(scene *s)
     for (size_t i = 0; i < s->view_count; i++)
         scene_view_free(&s->views[i]);
     mem_free(s->folder);
+    mem_free(s->held_out_list);
     mem_free(s->views);
     mem_free(s->points.position);
     mem_free(s->points.color);

@@ -61,6 +61,8 @@ typedef struct scene {
     size_t file_bytes;       /* of the files that say all this, without photos */
     char missing_names[256]; /* of the first of them */
     bool has_split;          /* the data set itself says which views are held out */
+    char *held_out_list; /* [held_out_bytes] SCENE_SPLIT_LIST: the list as it was read; else NULL; owned */
+    size_t held_out_bytes;
 } scene;
 
 typedef enum scene_split_kind {

@@ -94,6 +94,20 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
     return GBT_OK;
 }
 
+static gbt_status apply_list(const char *path, scene *s, gbt_error *err)
+{
+    unsigned char *bytes;
+    GBT_TRY(file_read(path, &bytes, &s->held_out_bytes, err));
+    s->held_out_list = (char *)bytes;
+    char *lines = mem_alloc(s->held_out_bytes + 1, 1, "list of held-out photos", err);
+    if (lines == NULL)
+        return GBT_ERR_NO_MEMORY;
+    memcpy(lines, bytes, s->held_out_bytes + 1);
+    const gbt_status status = mark_listed(s, lines, s->held_out_bytes, path, err);
+    mem_free(lines);
+    return status;
+}
+
 /* A single photo is trained on: holding it out would leave nothing. */
 static void mark_every(scene *s, int every, int offset)
 {
@@ -134,15 +148,9 @@ gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err)
             return base_fail(err, GBT_ERR_ARGUMENT, "split: wanted every >= 2, got %d", split->every);
         mark_every(s, split->every, split->offset);
         break;
-    case SCENE_SPLIT_LIST: {
-        unsigned char *bytes;
-        size_t size;
-        GBT_TRY(file_read(split->list_path, &bytes, &size, err));
-        const gbt_status status = mark_listed(s, (char *)bytes, size, split->list_path, err);
-        mem_free(bytes);
-        GBT_TRY(status);
+    case SCENE_SPLIT_LIST:
+        GBT_TRY(apply_list(split->list_path, s, err));
         break;
-    }
     }
     const size_t all = s->view_count;
     if (split->validate_every > 0)

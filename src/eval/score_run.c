@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/stop_signal.h"
 #include "cluster/cluster.h"
 
 /* Pictures go into `folder`; NULL: none. */
@@ -66,6 +67,9 @@ static gbt_status score_own_views(loaded_run *r, const lpips *net, const char *f
         if (!r->scene.views[i].is_test || index++ % size != rank)
             continue;
         view_score *v = &e->views[own++];
+        if (stop_signal_seen())
+            return base_fail(err, GBT_ERR_INTERRUPTED,
+                             "stopped while held-out views were scored (eval scores the run)");
         GBT_TRY(score_view(r, i, net, folder, v, err));
         log_count("score", index, e->view_count, v->psnr);
     }

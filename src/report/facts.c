@@ -123,26 +123,42 @@ void report_facts(text *out, const evaluation *e, const json_t *metrics, const c
     text_add(out, "</section>\n");
 }
 
-void report_again(text *out, const char *run, const json_t *metrics)
+/* The command that trained, as it was typed; what was typed to go on with a run does not say how it began. */
+static void add_command(text *out, const char *run, const json_t *metrics, bool resumed)
 {
-    const char *command = metrics_text(metrics, "command");
-    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how "
-                  "many steps there are. With the pace that this run recorded, the same photos give the same "
-                  "model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
-    if (command != NULL) {
+    const char *command = metrics_text(metrics, "command"), *data = metrics_text(metrics, "data");
+    if (resumed) {
+        text_add(out, "gbtrace train --config ");
+        text_escaped(out, run);
+        text_add(out, "/config -o NEW");
+    } else if (command != NULL) {
         text_escaped(out, command);
     } else {
         text_add(out, "gbtrace train ");
-        text_escaped(out, metrics_text(metrics, "data") != NULL ? metrics_text(metrics, "data") : "DATA");
+        text_escaped(out, data != NULL ? data : "DATA");
         text_add(out, " -o NEW");
     }
-    if (command == NULL || strstr(command, "--pace") == NULL) {
+}
+
+void report_again(text *out, const char *run, const json_t *metrics)
+{
+    const char *command = metrics_text(metrics, "command");
+    const bool resumed = command != NULL && strstr(command, " --resume") != NULL;
+    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how "
+                  "many steps there are. With the pace that this run recorded, the same photos give the same "
+                  "model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
+    add_command(out, run, metrics, resumed);
+    if (command == NULL || resumed || strstr(command, "--pace") == NULL) {
         const size_t before = out->length;
         text_add(out, " --pace ");
         if (!add_pace(out, metrics))
             out->length = out->status == GBT_OK ? before : out->length;
     }
-    text_add(out, "</pre>\n<p>The scores, the pictures and this page, from the model (<code>gbtrace "
+    text_add(out, "</pre>\n");
+    if (resumed)
+        text_add(out, "<p>If the run was given another length when it was resumed, its first steps had the "
+                      "schedules of the former length, and this makes another model.</p>\n");
+    text_add(out, "<p>The scores, the pictures and this page, from the model (<code>gbtrace "
                   "report</code> makes the page alone):</p>\n<pre class=\"card\">gbtrace eval ");
     text_escaped(out, run);
     text_add(

@@ -19,6 +19,7 @@
 #include "train/near.h"
 #include "train/pose_file.h"
 #include "train/rules.h"
+#include "train/run_split.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
@@ -176,7 +177,9 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
                                  gbt_error *err)
 {
     scene_split split;
-    GBT_TRY(scene_split_parse(out->def.eval_split, &split, err));
+    char split_text[RUN_SPLIT_TEXT_SIZE];
+    GBT_TRY(run_split_text(out->data.folder, out->def.eval_split, split_text, err));
+    GBT_TRY(scene_split_parse(split_text, &split, err));
     const bool has_data = out->data.place[0] != '\0';
     char cameras[4096];
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));

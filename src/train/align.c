@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "base/fail.h"
+#include "base/stop_signal.h"
 #include "train/near.h"
 
 enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60 };
@@ -57,6 +58,9 @@ static gbt_status align_view(trainer *t, step_view *v, size_t view, gbt_error *e
     const int finest = finest_level(t, view), levels = level_count(t, view, finest);
     *pose = t->poses.given[view];
     for (int i = 0; i < STEPS; i++) {
+        if (stop_signal_seen())
+            return base_fail(err, GBT_ERR_INTERRUPTED,
+                             "stopped while held-out photos were aligned; the run is saved (resume goes on)");
         const int level = finest + levels - 1 - i * levels / STEPS;
         const gbt_camera camera = photos_camera(&t->photos, view, level);
         double gradient[POSE_NUMBERS], motion[POSE_NUMBERS];

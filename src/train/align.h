@@ -10,6 +10,8 @@
  * others were, and the scene is not where these say. Each is brought, from its given pose, to where the
  * scene as it stands fits its photo best: six numbers of the camera, nothing of the scene. Small pictures
  * first.
+ *
+ * @return GBT_OK; GBT_ERR_INTERRUPTED at a signal (base/stop_signal.h): one photo is somewhere on its way
  */
 gbt_status align_held_out(trainer *t, gbt_error *err);
 

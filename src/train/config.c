@@ -7,6 +7,30 @@
 
 #include "base/fail.h"
 
+static gbt_status check_value(const char *field, const char *value, gbt_error *err)
+{
+    if (strchr(value, '\n') != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: has a line break (wanted one line, as the files of a run keep it)", field);
+    if (strlen(value) >= SETTING_TEXT_SIZE)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: \"%.60s...\": %zu bytes (wanted at most %d)", field,
+                         value, strlen(value), SETTING_TEXT_SIZE - 1);
+    return GBT_OK;
+}
+
+gbt_status config_check(const gbt_train_def *def, const char *data, gbt_error *err)
+{
+    GBT_TRY(check_value("data", data, err));
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) {
+        const gbt_train_setting *s = gbt_train_setting_at(i);
+        const char *text =
+            s->kind == GBT_SETTING_TEXT ? *(const char *const *)((const char *)def + s->offset) : NULL;
+        if (text != NULL)
+            GBT_TRY(check_value(s->field, text, err));
+    }
+    return GBT_OK;
+}
+
 void config_text(const gbt_train_def *d, const char *data, char *out, size_t size)
 {
     const gbt_train_def usual = gbt_train_def_default();

@@ -12,6 +12,10 @@ enum { CONFIG_TEXT_SIZE = 4096 };
     and the data folder. */
 void config_text(const gbt_train_def *def, const char *data, char *out, size_t size);
 
+/** Whether config_parse() would read that text back: GBT_ERR_ARGUMENT for a name of more than one line, or of
+    SETTING_TEXT_SIZE bytes. */
+gbt_status config_check(const gbt_train_def *def, const char *data, gbt_error *err);
+
 /** Where config_parse() keeps the strings that the def points to. */
 typedef struct config_strings {
     setting_texts texts;

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "base/compare.h"
+#include "base/fail.h"
 #include "base/memory.h"
 #include "train/camera_sees.h"
 
@@ -56,21 +57,24 @@ static bool exposure_of(const photos *p, size_t view, bool by_tracks, float *roo
     return true;
 }
 
-static double spread_over(const photos *p, const size_t *views, size_t count, bool by_tracks, float *room)
+static gbt_status spread_over(photos *p, const size_t *views, size_t count, bool by_tracks, float *room,
+                              double *stops, gbt_error *err)
 {
     double sum = 0, squares = 0, known = 0;
     for (size_t i = 0; i < count; i++) {
         double exposure;
-        if (p->full[views[i]] == NULL || !exposure_of(p, views[i], by_tracks, room, &exposure))
+        GBT_TRY(photos_read_full(p, views[i], err));
+        if (!exposure_of(p, views[i], by_tracks, room, &exposure))
             continue;
         known++;
         sum += exposure;
         squares += exposure * exposure;
     }
-    return known < 2 ? 0 : sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
+    *stops = known < 2 ? 0 : sqrt(fmax(0, squares - sum * sum / known) / (known - 1));
+    return GBT_OK;
 }
 
-gbt_status exposure_spread_find(const photos *p, const size_t *views, size_t count, exposure_spread *out,
+gbt_status exposure_spread_find(photos *p, const size_t *views, size_t count, exposure_spread *out,
                                 gbt_error *err)
 {
     *out = (exposure_spread){0};
@@ -82,8 +86,8 @@ gbt_status exposure_spread_find(const photos *p, const size_t *views, size_t cou
     bool tracks = false;
     for (size_t i = 0; i < count; i++)
         tracks = tracks || p->source->views[views[i]].seen_count > 0;
-    out->stops = spread_over(p, views, count, tracks, room);
+    const gbt_status status = spread_over(p, views, count, tracks, room, &out->stops, err);
     out->large = out->stops > (tracks ? EXPOSURE_SPREAD_BY_TRACKS : EXPOSURE_SPREAD_WITHOUT);
     mem_free(room);
-    return GBT_OK;
+    return status;
 }

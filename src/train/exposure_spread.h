@@ -23,10 +23,10 @@ typedef struct exposure_spread {
  * These points are those whose tracks name the photo; where no tracks are known, all in view, some of them
  * hidden.
  *
- * @param views [in] [count]; of these, photos that are in memory
- * @return GBT_OK or GBT_ERR_NO_MEMORY
+ * @param views [in] [count]; photos of these that are not in memory are read, one after the other
+ * @return GBT_OK, GBT_ERR_NO_MEMORY, or why a photo cannot be read
  */
-gbt_status exposure_spread_find(const photos *p, const size_t *views, size_t count, exposure_spread *out,
+gbt_status exposure_spread_find(photos *p, const size_t *views, size_t count, exposure_spread *out,
                                 gbt_error *err);
 
 #endif

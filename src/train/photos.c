@@ -217,9 +217,9 @@ static gbt_status read_into(photos *p, size_t view, gbt_error *err)
     return status;
 }
 
-/* Into p->full, if it is not there. Views come in random order, each as often as any other: the first that
-   were read stay, for whatever else stayed would be asked for no sooner. */
-static gbt_status read_full(photos *p, size_t view, gbt_error *err)
+/* Views come in random order, each as often as any other: the first that were read stay, for whatever else
+   stayed would be asked for no sooner. */
+gbt_status photos_read_full(photos *p, size_t view, gbt_error *err)
 {
     if (p->full[view] != NULL)
         return GBT_OK;
@@ -278,7 +278,7 @@ gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *
 static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
-    GBT_TRY(read_full(p, view, err));
+    GBT_TRY(photos_read_full(p, view, err));
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->full[view], out);
     return GBT_OK;
@@ -399,7 +399,7 @@ static gbt_status get_laid_on(photos *p, size_t view, int level, const float *ba
                               gbt_error *err)
 {
     const gbt_camera full = photos_camera(p, view, 0), camera = photos_camera(p, view, level);
-    GBT_TRY(read_full(p, view, err));
+    GBT_TRY(photos_read_full(p, view, err));
     if (p->through[view] == NULL)
         return GBT_OK;
     image whole = {0};
@@ -429,7 +429,7 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
                                         : GBT_OK;
     }
     *step = from.step;
-    GBT_TRY(read_full(p, view, err));
+    GBT_TRY(photos_read_full(p, view, err));
     GBT_TRY(image_fit(out, from.width, from.height, 3, err));
     pick_pixels(p, view, full.width, &from, sample->backdrop, out);
     return pick_valid(p, view, full.width, &from, valid, err);

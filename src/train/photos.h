@@ -49,6 +49,9 @@ void photos_close(photos *p);
     for. The first failure in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
+/** Read a photo into p->full, if it is not there: it stays, or stays until the next that finds no room. */
+gbt_status photos_read_full(photos *p, size_t view, gbt_error *err);
+
 /** Camera of a photo that is divided: its size is round(stated / divide), at least 1. */
 gbt_camera photo_camera_divided(const gbt_camera *stated, double divide);
 

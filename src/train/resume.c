@@ -12,6 +12,7 @@
 #include "train/checkpoint.h"
 #include "train/def.h"
 #include "train/run_data.h"
+#include "train/run_split.h"
 
 /* The checkpoint to go on from, and the settings in it. */
 static gbt_status find_checkpoint(const char *latest, const char *previous, const char **path,
@@ -125,9 +126,17 @@ gbt_status resume_open(trainer *t, const char *data, const char *run, const char
     GBT_TRY(train_def_check(def, err));
     GBT_TRY(find_checkpoint(latest, previous, &path, config, err));
     gbt_train_def saved = *def;
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) /* it says nothing of some that it left alone */
+        if (gbt_train_setting_at(i)->saved)
+            setting_set_default(gbt_train_setting_at(i), &saved);
     GBT_TRY(config_parse(config, path, &saved, strings, err));
     warn_of_differences(def, &saved);
+    const char *named = saved.eval_split; /* which its files say, wherever the list is now */
+    char split[RUN_SPLIT_TEXT_SIZE];
+    GBT_TRY(run_split_text(run, named, split, err));
+    saved.eval_split = split;
     GBT_TRY(open_data(t, data, run, &saved, strings->data, err));
+    t->def.eval_split = named;
     GBT_TRY(checkpoint_load(t, path, err));
     return change_length(t, run, def, err);
 }

@@ -16,10 +16,12 @@
 #include "train/align.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/old_run.h"
 #include "train/pose_file.h"
 #include "train/resume.h"
 #include "train/run_data.h"
 #include "train/run_log.h"
+#include "train/run_split.h"
 #include "train/save.h"
 #include "train/step_size.h"
 #include "train/trainer.h"
@@ -118,8 +120,6 @@ static void pace_extend(trainer *t, const speed *s)
 static gbt_status finish_poses(trainer *t, gbt_error *err)
 {
     double angle, distance;
-    if (t->poses.count == 0)
-        return GBT_OK;
     GBT_TRY(align_held_out(t, err));
     GBT_TRY(poses_moved(&t->poses, &t->scene, t->train_views, t->train_count, &angle, &distance, err));
     log_info("%s: poses moved by %.2g degrees and %.2g scene units (the median photo); %zu held-out photos "
@@ -251,20 +251,32 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
 
 static gbt_status write_settings(const trainer *t, const char *run, const run_paths *paths, gbt_error *err)
 {
-    char config[CONFIG_TEXT_SIZE];
-    config_text(&t->def, t->scene.folder, config, sizeof config);
+    char config[CONFIG_TEXT_SIZE], split[RUN_SPLIT_TEXT_SIZE];
+    gbt_train_def def = t->def;
+    GBT_TRY(run_split_save(run, &t->scene, err));
+    GBT_TRY(run_split_text(run, def.eval_split, split, err));
+    if (strlen(split) < SETTING_TEXT_SIZE)
+        def.eval_split = split;
+    config_text(&def, t->scene.folder, config, sizeof config);
     GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
     return run_data_save(run, t->scene.folder, err);
 }
 
+/* All is saved before held-out photos are aligned, which takes its time and can be stopped. */
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
     GBT_TRY(save_finish(saving, err));
-    GBT_TRY(finish_poses(t, err));
     GBT_TRY(save_all(t, paths, err));
-    return log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step)
-               ? run_log_summary(log, t, paths->json, err)
+    if (log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step))
+        GBT_TRY(run_log_summary(log, t, paths->json, err));
+    if (t->poses.count > 0) {
+        GBT_TRY(finish_poses(t, err));
+        GBT_TRY(save_all(t, paths, err));
+    }
+    return stop_signal_seen()
+               ? base_fail(err, GBT_ERR_INTERRUPTED,
+                           "stopped after the last step; saved in %s (resume goes on)", paths->checkpoint)
                : GBT_OK;
 }
 
@@ -278,7 +290,10 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
     GBT_TRY(cluster_agree(saving != NULL ? GBT_OK : GBT_ERR_NO_MEMORY, err));
     if (cluster_leads()) {
-        status = write_settings(t, run, paths, err);
+        if (def->overwrite)
+            status = old_run_remove(run, err);
+        if (status == GBT_OK)
+            status = write_settings(t, run, paths, err);
         if (status == GBT_OK)
             status = run_log_open(&log, t, paths->log, paths->events, err);
     }

@@ -199,7 +199,7 @@ static void tell_progress(const run_log *log, const trainer *t)
     gbt_event e = {.text = line,
                    .stage = "train",
                    .done = t->step,
-                   .total = t->def.iterations,
+                   .total = t->def.pace != NULL ? pace_total(&t->pace) : t->def.iterations,
                    .fraction = progress,
                    .seconds = t->seconds};
     e.seconds_left = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/fail.h"
 
@@ -16,20 +17,26 @@ pace pace_of_iterations(uint64_t iterations)
     return p;
 }
 
+static const char *skip_blanks(const char *at) { return at + strspn(at, " \t\r\n"); }
+
 gbt_status pace_parse(const char *text, pace *out, gbt_error *err)
 {
     *out = (pace){.known = PACE_SEGMENTS};
-    const char *at = text;
+    const char *at = skip_blanks(text);
+    const bool in_brackets = *at == '[';
+    at = skip_blanks(at + in_brackets);
     for (int i = 0; i < PACE_SEGMENTS; i++) {
-        char *end;
-        const unsigned long long n = strtoull(at, &end, 10);
-        const char wanted = i + 1 < PACE_SEGMENTS ? ',' : '\0';
-        if (end == at || *at < '0' || *at > '9' || *end != wanted || n > 1000000000ull)
+        char *number_end;
+        const unsigned long long n = strtoull(at, &number_end, 10);
+        const char *end = skip_blanks(number_end);
+        const char wanted = i + 1 < PACE_SEGMENTS ? ',' : in_brackets ? ']' : '\0';
+        if (*at < '0' || *at > '9' || *end != wanted || n > 1000000000ull ||
+            (wanted == ']' && *skip_blanks(end + 1) != '\0'))
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "pace: entry %d of \"%.60s\" (wanted %d counts, separated by commas)", i + 1,
                              text, PACE_SEGMENTS);
         out->steps[i] = n;
-        at = end + 1;
+        at = wanted == ',' ? skip_blanks(end + 1) : end;
     }
     return GBT_OK;
 }

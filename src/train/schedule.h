@@ -24,7 +24,7 @@ typedef struct pace {
 /** Equal parts that sum to `iterations` (parts may be empty for fewer than PACE_SEGMENTS iterations). */
 pace pace_of_iterations(uint64_t iterations);
 
-/** "n1,...,n20"; GBT_ERR_ARGUMENT otherwise. */
+/** "n1,...,n20", or as train.json has it: "[n1, ..., n20]"; GBT_ERR_ARGUMENT otherwise. */
 gbt_status pace_parse(const char *text, pace *out, gbt_error *err);
 
 /** The text that pace_parse() reads, of a pace whose parts are all known. */

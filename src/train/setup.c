@@ -12,6 +12,7 @@
 #include "bvh/points.h"
 #include "gbtrace/cluster.h"
 #include "train/camera_sees.h"
+#include "train/config.h"
 #include "train/def.h"
 #include "train/near.h"
 #include "train/setup_data.h"
@@ -162,11 +163,48 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+static void choose_background(trainer *t)
+{
+    const bool given = scene_background(&t->scene, t->settings.background),
+               wants_sky = t->def.background == GBT_BACKGROUND_SKY;
+    if (!given && t->rules.background_from_points) {
+        if (t->scene.points.has_color)
+            mean_color(&t->scene.points, t->settings.background);
+        t->settings.sky.varies = wants_sky;
+    }
+    if (t->settings.sky.varies) /* it is what the photos show */
+        t->rules.opaque_from = HUGE_VAL;
+    else if (wants_sky)
+        log_warn("%s: no sky is learned: %s", t->scene.folder,
+                 given ? "photos with an alpha channel lie on one colour" : "compat has one colour");
+}
+
+/* How long the run is; a budget decides as it goes on. A run that is resumed has what it has. */
+static gbt_status take_length(trainer *t, gbt_error *err)
+{
+    gbt_train_def *def = &t->def;
+    if (def->pace == NULL) {
+        if (def->iterations > 0)
+            t->pace = pace_of_iterations(def->iterations);
+        return GBT_OK;
+    }
+    GBT_TRY(pace_parse(def->pace, &t->pace, err));
+    if (!def->resume && def->iterations > 0 && def->iterations != pace_total(&t->pace))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "iterations: %llu (wanted the %llu of `pace` in all, or only one of the two)",
+                         (unsigned long long)def->iterations, (unsigned long long)pace_total(&t->pace));
+    pace_text(&t->pace, t->pace_words);
+    def->pace = t->pace_words;
+    return GBT_OK;
+}
+
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err)
 {
     GBT_TRY(train_def_check(def, err));
     t->def = *def;
     train_def_settle(&t->def);
+    GBT_TRY(take_length(t, err));
+    GBT_TRY(config_check(&t->def, data, err));
     t->rules = train_rules_of(&t->def);
     if (t->def.views % gbt_cluster_size() != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
@@ -178,17 +216,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
-    if (!scene_background(&t->scene, t->settings.background) && t->rules.background_from_points) {
-        if (t->scene.points.has_color)
-            mean_color(&t->scene.points, t->settings.background);
-        t->settings.sky.varies = t->def.background == GBT_BACKGROUND_SKY;
-    }
-    if (t->settings.sky.varies) /* it is what the photos show */
-        t->rules.opaque_from = HUGE_VAL;
-
-    if (def->pace != NULL)
-        GBT_TRY(pace_parse(def->pace, &t->pace, err));
-    else if (def->iterations > 0)
-        t->pace = pace_of_iterations(def->iterations);
+    choose_background(t);
     return GBT_OK;
 }

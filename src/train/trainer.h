@@ -64,9 +64,10 @@ struct trainer {
     char start_text[160]; /* what the run starts from, for people */
 
     pace pace;
-    uint64_t step;       /* steps done */
-    uint64_t round_step; /* steps done at the last round of growth */
-    uint64_t anchor_t;   /* Adam steps of the per-anchor groups */
+    char pace_words[PACE_TEXT_SIZE]; /* def.pace, where there is one: as files have it */
+    uint64_t step;                   /* steps done */
+    uint64_t round_step;             /* steps done at the last round of growth */
+    uint64_t anchor_t;               /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;
     uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian though anchors were visible;
                                          how often that was mended */

@@ -221,6 +221,10 @@ rm -f closed
 ( while [ ! -e closed ]; do sleep 0.05; done; "$program" train made -o unread --iterations 2 --eval-split none 2>&1 >/dev/null; echo $? >code ) | { exec <&-; : >closed; }
 [ "$(cat code)" = 0 ] && [ -s unread/model.gbt ]
 report $? "a training whose progress nobody reads" "  got $(cat code)"
+rm -f closed
+( while [ ! -e closed ]; do sleep 0.05; done; "$program" query nearest tiny --at 0,0,0 --count 100 2>err; echo $? >code ) | { exec <&-; : >closed; }
+[ "$(cat code)" = 141 ] && [ ! -s err ]
+report $? "a query whose answers nobody reads" "  got $(cat code): $(cat err)"
 [ "$(tail -n 2 out)" = "Report: tiny/report.html
 Viewer: gbtrace view tiny" ]
 report $? "its last lines say what to look at" "$(cat out)"

@@ -37,6 +37,11 @@ report $? "a failure" "$(cat err)"
 "$program" eval --progress json --prest fast 2>err
 [ $? = 2 ] && [ "$(cat err)" = "error: --prest: unknown option (did you mean --preset?)" ]
 report $? "a command line that was not understood is told in plain words" "$(cat err)"
+"$program" train made -o paced --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --progress json 2>err && as_json err 'any(x.get("stage") == "train" and x["done"] == x["total"] == 21 for x in e)'
+report $? "the total of a run with a pace" "$(cat err)"
+"$program" train made -o none --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --iterations 20 2>err
+[ $? = 2 ] && [ "$(cat err)" = "error: --iterations: 20 (wanted the 21 of --pace in all, or only one of the two)" ]
+report $? "a pace and another number of iterations" "$(cat err)"
 "$program" eval run --quiet >out 2>err && [ ! -s err ] && [ ! -s out ]
 report $? "quiet" "$(cat err)"
 

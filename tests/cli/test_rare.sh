@@ -34,6 +34,10 @@ holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --e
 holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"
 mkdir wide && cp -r made/* wide && holds "a sky that is learned" 0 '^2 held-out views: ' train wide -o wide/run --iterations 5 --background sky
 holds "and what it was trained with" 0 '^  config    background = sky$' info wide/run
+printf '0001.png\n0005.png\n' >names.txt && "$program" train made -o listed --iterations 3 --eval-split list=names.txt --quiet >out 2>err && rm names.txt &&
+    mkdir apart && (cd apart && "$program" eval ../listed) >out 2>>err && grep -q '^2 held-out views: ' err && "$program" train --config listed/config -o again --quiet >>out 2>>err &&
+    cmp again/held-out.txt listed/held-out.txt >>err && cat listed/report.html | grep -q ' --eval-split list=names.txt'
+report $? "a list of held-out photos stays with the run" "$(cat err out; cat listed/config)"
 
 # ---- pictures
 "$program" render run -o shown --format exr >out 2>err && "$program" render run -o exact --renderer reference --format exr >>out 2>>err &&

@@ -606,6 +606,24 @@ static void odd_metrics(void **state)
     free(e.views);
 }
 
+/* The command that went on says neither the data nor the settings. */
+static void a_resumed_run_is_made_again(void **state)
+{
+    (void)state;
+    write_pictures();
+    write_log(5, "");
+    evaluation e = make_views(1);
+    json_t *metrics = full_metrics();
+    json_object_set_new(metrics, "command", json_string("gbtrace train -o run --resume --pace 1,2 --quiet"));
+    char *page = write_report(&e, metrics), wanted[VIEW_PATH_SIZE];
+    snprintf(wanted, sizeof wanted, ">gbtrace train --config %s/config -o NEW --pace 333,333,334</pre>",
+             folder);
+    assert_non_null(strstr(page, wanted));
+    free(page);
+    json_decref(metrics);
+    free(e.views);
+}
+
 static void many_views(void **state)
 {
     (void)state;
@@ -1017,6 +1035,7 @@ int main(void)
     ADD(maps_lie_along_the_cameras);
     ADD(layers_have_the_logged_heights);
     ADD(odd_metrics);
+    ADD(a_resumed_run_is_made_again);
     ADD(many_views);
     ADD(no_memory);
     ADD(not_a_folder);

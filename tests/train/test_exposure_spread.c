@@ -25,7 +25,7 @@ static const char *exposed_scene(const char *name, double stops)
     return folder;
 }
 
-static exposure_spread differences_of(const trainer *t)
+static exposure_spread differences_of(trainer *t)
 {
     exposure_spread out;
     assert_ok(exposure_spread_find(&t->photos, t->train_views, t->train_count, &out, NULL));
@@ -60,6 +60,27 @@ static void exposures_are_found(void **state)
     }
 }
 
+/* Memory decides where photos are, not what is learned from them. */
+static void photos_without_room_count(void **state)
+{
+    (void)state;
+    trainer t;
+    const gbt_train_def def = run_def();
+    open_ok(&t, exposed_scene("crowded", 1), &def);
+    const exposure_spread all = differences_of(&t);
+    photos_close(&t.photos);
+    assert_ok(photos_open(&t.photos, &t.scene, 1, NULL));
+    t.photos.bytes_max = 2 * 3 * 48 * 36;
+    assert_ok(photos_load(&t.photos, t.train_views, t.train_count, NULL));
+    const exposure_spread few = differences_of(&t);
+    size_t kept = 0;
+    for (size_t v = 0; v < t.scene.view_count; v++)
+        kept += t.photos.full[v] != NULL;
+    assert_int_equal(kept, 3); /* the last one is passing */
+    assert_true(few.large && few.stops == all.stops);
+    trainer_free(&t);
+}
+
 static void found_exposures_can_be_left(void **state)
 {
     (void)state;
@@ -78,6 +99,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exposures_are_found),
+        cmocka_unit_test(photos_without_room_count),
         cmocka_unit_test(found_exposures_can_be_left),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);

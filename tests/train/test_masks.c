@@ -293,6 +293,43 @@ static void alpha_is_what_it_is_said_to_be(void **state)
                 "alpha: 7 (wanted auto, black, white or mask)");
 }
 
+static void keep_warning(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_WARNING)
+        snprintf(context, PATH_SIZE, "%s", event->text);
+}
+
+/* A sky that was asked for and that nothing would show. */
+static void a_sky_that_is_not_learned_is_told(void **state)
+{
+    (void)state;
+    const char *cut = in_root("sky");
+    make_tiny_scene(cut);
+    change_photos(cut, cut_out);
+    static const struct {
+        bool has_alpha, compat;
+        const char *says;
+    } cases[] = {{false, false, NULL},
+                 {true, false, "no sky is learned: photos with an alpha channel lie on one colour"},
+                 {false, true, "no sky is learned: compat has one colour"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char warning[PATH_SIZE] = "";
+        gbt_train_def def = run_def();
+        def.background = GBT_BACKGROUND_SKY;
+        def.compat = cases[i].compat;
+        trainer t;
+        gbt_listen(keep_warning, warning);
+        open_ok(&t, cases[i].has_alpha ? cut : tiny, &def);
+        be_quiet();
+        assert_int_equal(t.settings.sky.varies, cases[i].says == NULL);
+        if (cases[i].says == NULL)
+            assert_string_equal(warning, "");
+        else
+            assert_non_null(strstr(warning, cases[i].says));
+        trainer_free(&t);
+    }
+}
+
 /* Of a whole photo, picked pixels, a part, and a photo whose lens cannot be shifted. */
 static void transparent_parts_lie_on_the_colour_asked_for(void **state)
 {
@@ -356,6 +393,7 @@ int main(void)
         cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
+        cmocka_unit_test(a_sky_that_is_not_learned_is_told),
         cmocka_unit_test(transparent_parts_lie_on_the_colour_asked_for),
     };
     return cmocka_run_group_tests_name("masks", tests, make_root, remove_root);

@@ -3,6 +3,9 @@
    do not drift, a run goes on with them, and whoever opens the run sees from there. */
 #include "run_support.h"
 
+#include <pthread.h>
+#include <signal.h>
+
 #include "base/rng.h"
 #include "base/vec.h"
 #include "run/loaded_run.h"
@@ -158,6 +161,42 @@ static void a_run_goes_on_with_its_poses(void **state)
     }
 }
 
+/* A signal as soon as the run has been summed up, which is when held-out photos are aligned. */
+static void *signal_at_summary(void *path)
+{
+    while (!file_exists(path))
+        usleep(200);
+    kill(getpid(), SIGTERM);
+    return NULL;
+}
+
+static void held_out_photos_are_aligned_after_a_signal(void **state)
+{
+    (void)state;
+    pthread_t thread;
+    char summary[PATH_SIZE];
+    snprintf(summary, sizeof summary, "%s", in_root("stopped/train.json"));
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    def.eval_split = "every=2";
+    train_ok(tiny, in_root("unstopped"), &def);
+    signal(SIGTERM, SIG_IGN); /* should it come too late */
+    assert_int_equal(pthread_create(&thread, NULL, signal_at_summary, summary), 0);
+    train_fails(tiny, in_root("stopped"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    signal(SIGTERM, SIG_DFL);
+    bytes before = read_bytes(summary);
+    def.resume = true;
+    train_ok(NULL, in_root("stopped"), &def);
+    assert_same_file(in_root("unstopped/model.gbt"), in_root("stopped/model.gbt"));
+    assert_same_file(in_root("unstopped/poses.json"), in_root("stopped/poses.json"));
+    bytes after = read_bytes(summary);
+    assert_int_equal(before.count, after.count);
+    assert_memory_equal(before.data, after.data, before.count);
+    mem_free(before.data);
+    mem_free(after.data);
+}
+
 /* Poses differ from those of the data set, and whoever opens the run has them; with other data that has its
    own, not. */
 static void whoever_opens_the_run_has_them(void **state)
@@ -221,6 +260,7 @@ int main(void)
         cmocka_unit_test(the_mean_stays),
         cmocka_unit_test(disturbed_poses_come_back),
         cmocka_unit_test(a_run_goes_on_with_its_poses),
+        cmocka_unit_test(held_out_photos_are_aligned_after_a_signal),
         cmocka_unit_test(whoever_opens_the_run_has_them),
         cmocka_unit_test(what_is_no_pose_is_refused),
     };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/train/test_resume.c -- going on: a finished run to another length, the run's own data, what is
-   refused. */
+   refused; a run that was overwritten does not come back. */
 #include "run_support.h"
 
 #include <jansson.h>
@@ -218,14 +218,121 @@ static void a_learned_sky_goes_on(void **state)
     model_free(&m);
 }
 
+static void keep_warnings(const gbt_event *event, void *context)
+{
+    char *kept = context;
+    if (event->kind == GBT_EVENT_WARNING)
+        snprintf(kept + strlen(kept), PATH_SIZE - strlen(kept), "%s\n", event->text);
+}
+
+/* Neither is in the file of a run that left it alone. */
+static void what_a_run_left_alone_stays(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    train_ok(tiny, in_root("plain"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    gbt_train_def on = resume_def(STEPS, 0);
+    on.views = 4;
+    on.background = GBT_BACKGROUND_SKY;
+    on.refine_poses = true;
+    char warnings[PATH_SIZE] = "";
+    gbt_listen(keep_warnings, warnings);
+    train_ok(tiny, in_root("asked"), &on);
+    be_quiet();
+    assert_string_equal(warnings, "a run is resumed with its own settings: views = 1, not 4\n"
+                                  "a run is resumed with its own settings: background = constant, not sky\n"
+                                  "a run is resumed with its own settings: refine-poses = 0, not 1\n");
+    assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
+}
+
+static void write_text(const char *path, const char *text)
+{
+    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
+}
+
+/* What becomes of the list that was named, and where the run is gone on with, decides nothing. */
+static void a_list_of_held_out_photos_is_the_runs_own(void **state)
+{
+    (void)state;
+    char split[PATH_SIZE], wanted[PATH_SIZE];
+    snprintf(split, sizeof split, "validate=3,list=%s", in_root("held.txt"));
+    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_root("list/held-out.txt"));
+    write_text(in_root("held.txt"), "0001.png\r\n\n0004.png");
+    gbt_train_def def = run_def();
+    def.eval_split = split;
+    train_ok(tiny, in_root("list straight"), &def);
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
+    write_text(in_root("held.txt"), "0002.png\n");
+    const gbt_train_def on = resume_def(0, 0);
+    train_ok(tiny, in_root("list"), &on);
+    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
+    bytes config = read_bytes(in_root("list/config"));
+    assert_non_null(strstr((const char *)config.data, wanted));
+    mem_free(config.data);
+    /* A run of an older version has none. */
+    assert_int_equal(remove(in_root("list/held-out.txt")), 0);
+    write_text(in_root("held.txt"), "0001.png\n0004.png\n");
+    train_ok(tiny, in_root("list"), &on);
+    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
+    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
+}
+
+/* However the new run ends: here, before its first checkpoint. */
+static void an_overwritten_run_is_gone(void **state)
+{
+    (void)state;
+    static const char *const old[] = {"checkpoints/last.gbt",
+                                      "checkpoints/last.gbt.prev",
+                                      "model.gbt",
+                                      "poses.json",
+                                      "exposure.json",
+                                      "train.json",
+                                      "metrics.json",
+                                      "report.html",
+                                      "renders/test/0.png",
+                                      "events.out.tfevents.0.train"};
+    enum { OLD = sizeof old / sizeof *old };
+    gbt_train_def def = run_def(), on = resume_def(0, 0);
+    def.refine_poses = true;
+    train_ok(tiny, in_root("lost"), &def);
+    assert_ok(file_make_folder(in_root("lost/renders/test"), NULL));
+    for (int i = 0; i < OLD; i++)
+        if (!file_exists(in_root("lost/%s", old[i])))
+            write_text(in_root("lost/%s", old[i]), "old");
+    write_text(in_root("lost/notes.txt"), "old");
+    def = run_def();
+    def.overwrite = true;
+    train_fails(in_root("no data"), in_root("lost"), &def, GBT_ERR_IO, "no data");
+    for (int i = 0; i < OLD; i++)
+        assert_true(file_exists(in_root("lost/%s", old[i])));
+    assert_int_equal(remove(in_root("lost/log.csv")), 0); /* cannot be written where a folder is */
+    assert_ok(file_make_folder(in_root("lost/log.csv"), NULL));
+    train_fails(tiny, in_root("lost"), &def, GBT_ERR_IO, "log.csv");
+    for (int i = 0; i < OLD; i++)
+        assert_false(file_exists(in_root("lost/%s", old[i])));
+    assert_true(file_exists(in_root("lost/notes.txt")));
+    train_fails(tiny, in_root("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+}
+
 int main(void)
 {
     be_quiet();
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_finished_run_goes_on),       cmocka_unit_test(the_new_length_decides),
-        cmocka_unit_test(a_run_goes_on_for_a_time),     cmocka_unit_test(a_length_that_has_passed_is_refused),
-        cmocka_unit_test(nothing_left_changes_nothing), cmocka_unit_test(the_run_knows_its_data),
-        cmocka_unit_test(other_data_are_refused),       cmocka_unit_test(a_learned_sky_goes_on),
+        cmocka_unit_test(a_finished_run_goes_on),
+        cmocka_unit_test(the_new_length_decides),
+        cmocka_unit_test(a_run_goes_on_for_a_time),
+        cmocka_unit_test(a_length_that_has_passed_is_refused),
+        cmocka_unit_test(nothing_left_changes_nothing),
+        cmocka_unit_test(the_run_knows_its_data),
+        cmocka_unit_test(other_data_are_refused),
+        cmocka_unit_test(a_learned_sky_goes_on),
+        cmocka_unit_test(what_a_run_left_alone_stays),
+        cmocka_unit_test(an_overwritten_run_is_gone),
+        cmocka_unit_test(a_list_of_held_out_photos_is_the_runs_own),
     };
     return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
 }

@@ -4,6 +4,7 @@
 #include "run_support.h"
 
 #include <jansson.h>
+#include <signal.h>
 
 #include "base/log.h"
 #include "base/parallel.h"
@@ -742,6 +743,34 @@ static void exposure_resumes_to_the_same_bits(void **state)
     assert_same_file(in_root("exposure straight/exposure.json"), in_root("exposure halves/exposure.json"));
 }
 
+static void signal_at_warning(const gbt_event *event, void *context)
+{
+    (void)context;
+    if (event->kind == GBT_EVENT_WARNING)
+        raise(SIGTERM);
+}
+
+/* The warning, that poses of training are not there, comes when the run is opened. */
+static void scoring_stops_at_a_signal(void **state)
+{
+    (void)state;
+    const char *run = in_root("unscored");
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    gbt_train_def def = run_def();
+    def.iterations = 3;
+    def.refine_poses = true;
+    train_ok(tiny, run, &def);
+    assert_int_equal(remove(joined(run, "poses.json")), 0);
+    gbt_error err = {0};
+    gbt_listen(signal_at_warning, NULL);
+    assert_int_equal(gbt_evaluate(run, &score, &err), GBT_ERR_INTERRUPTED);
+    be_quiet();
+    assert_string_equal(err.text, "stopped while held-out views were scored (eval scores the run)");
+    assert_false(file_exists(joined(run, "metrics.json")));
+    assert_ok(gbt_evaluate(run, &score, NULL));
+    assert_true(file_exists(joined(run, "metrics.json")));
+}
+
 int main(void)
 {
     be_quiet();
@@ -761,6 +790,7 @@ int main(void)
         cmocka_unit_test(exposures_stay_centred),
         cmocka_unit_test(exposure_is_learned),
         cmocka_unit_test(exposure_resumes_to_the_same_bits),
+        cmocka_unit_test(scoring_stops_at_a_signal),
     };
     return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);
 }

@@ -727,6 +727,16 @@ static void data_without_training_photos_is_refused(void **state)
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
     train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
+    char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
+    snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
+    make_tiny_scene(two_lines); /* no run could be opened again that names this */
+    train_fails(two_lines, in_root("none"), &def, GBT_ERR_ARGUMENT, "data: has a line break");
+    memset(long_name, 'x', 2 * PATH_SIZE);
+    long_name[2 * PATH_SIZE] = '\0';
+    train_fails(long_name, in_root("none"), &def, GBT_ERR_ARGUMENT, "1024 bytes (wanted at most 1023)");
+    def.eval_split = "list=two\nlines";
+    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "eval_split: has a line break");
+    def = run_def();
     def.cookie_ = 0;
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "gbt_train_def_default");
     assert_false(file_exists(in_root("none/model.gbt")));
@@ -1012,10 +1022,17 @@ static void pace_is_read(void **state)
     (void)state;
     pace p;
     gbt_error err = {0};
-    assert_ok(pace_parse("1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20", &p, &err));
-    assert_int_equal(p.known, PACE_SEGMENTS);
-    for (int i = 0; i < PACE_SEGMENTS; i++)
-        assert_int_equal(p.steps[i], i + 1);
+    static const char *const good[] = {
+        "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+        "1, 2,3 ,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20 ",
+        "[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20]",
+        "[\n    1,\n    2,\n3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,\n    20\n  ]\n"};
+    for (size_t k = 0; k < sizeof good / sizeof *good; k++) {
+        assert_ok(pace_parse(good[k], &p, &err));
+        assert_int_equal(p.known, PACE_SEGMENTS);
+        for (int i = 0; i < PACE_SEGMENTS; i++)
+            assert_int_equal(p.steps[i], i + 1);
+    }
     static const char *const bad[] = {"",
                                       "1",
                                       "1,2",
@@ -1023,7 +1040,14 @@ static void pace_is_read(void **state)
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,x",
                                       "-1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
-                                      "1, 2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20]",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20]]",
+                                      "[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19]",
+                                      "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20 1",
+                                      "[",
+                                      "[]",
+                                      " ",
                                       "1,,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
                                       "1.5,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20",
                                       "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,99999999999999999999"};
@@ -1036,6 +1060,18 @@ static void pace_is_read(void **state)
     def.iterations = 0;
     def.pace = "1,2";
     train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
+    def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
+    def.iterations = 209;
+    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");
+    trainer t;
+    def.iterations = 210;
+    open_ok(&t, tiny, &def);
+    assert_int_equal(t.pace.steps[19], 20);
+    trainer_free(&t);
+    def.pace = good[3];
+    open_ok(&t, tiny, &def);
+    assert_string_equal(t.def.pace, good[0]); /* which the files of the run say */
+    trainer_free(&t);
 }
 
 static void levels_and_rates(void **state)

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/old_run.c -- what an older run left in the folder of one that starts anew. */
+#include "train/old_run.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+#include "base/file.h"
+#include "train/event_records.h"
+#include "train/pose_file.h"
+
+enum { OLD_PATH_SIZE = 4096 };
+
+static const char *const left[] = {
+    "report.html",    "metrics.json",        "train.json",   EVENTS_TRAIN_NAME,
+    EVENTS_EVAL_NAME, "exposure.json",       POSE_FILE_NAME, "checkpoints/last.gbt.prev",
+    "model.gbt",      "checkpoints/last.gbt"};
+
+static gbt_status remove_file(const char *folder, const char *name, gbt_error *err)
+{
+    char path[OLD_PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, folder, name, err));
+    if (unlink(path) != 0 && errno != ENOENT && errno != ENOTDIR)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot remove it: %s", path, strerror(errno));
+    return GBT_OK;
+}
+
+static bool is_picture(const char *name)
+{
+    const size_t length = strlen(name);
+    return length > 4 && strcmp(name + length - 4, ".png") == 0;
+}
+
+/* Of held-out views, of which the new run may have others. */
+static gbt_status remove_pictures(const char *run, gbt_error *err)
+{
+    char folder[OLD_PATH_SIZE];
+    GBT_TRY(file_join(folder, sizeof folder, run, "renders/test", err));
+    DIR *entries = opendir(folder);
+    if (entries == NULL)
+        return GBT_OK;
+    gbt_status status = GBT_OK;
+    for (const struct dirent *entry; status == GBT_OK && (entry = readdir(entries)) != NULL;)
+        if (is_picture(entry->d_name))
+            status = remove_file(folder, entry->d_name, err);
+    closedir(entries);
+    return status;
+}
+
+gbt_status old_run_remove(const char *run, gbt_error *err)
+{
+    GBT_TRY(remove_pictures(run, err));
+    for (size_t i = 0; i < sizeof left / sizeof *left; i++)
+        GBT_TRY(remove_file(run, left[i], err));
+    return GBT_OK;
+}

@@ -238,6 +238,12 @@ async function fetchPhoto(view) {
     look.photo = canvas;
 }
 
+// Whether two scenes have the same photo where one is looked at; its pose may be refined meanwhile.
+function hasSamePhoto(a, b) {
+    const of = scene => ["name", "width", "height", "lens"].map(key => scene.views[look.view]?.[key]).join();
+    return a.input === b.input && of(a) === of(b);
+}
+
 // The lens of a camera file that comes nearest to one of a data set. Its scale in the middle is the photo's: fov_x_deg is a pinhole's with it.
 function takeLens(view) {
     const fisheye = view.lens.includes("FISHEYE"), radian = Math.PI / 180;
@@ -293,7 +299,7 @@ async function statusChanged(status) {
         return fail(new Error("gbtrace view has ended; start it again to go on."));
     if (status.version === 0)
         return fail(new Error(status.note));
-    const scene = await (await fetch("scene")).json(), first = look.scene === null;
+    const scene = await (await fetch("scene")).json(), first = look.scene === null || !hasSamePhoto(look.scene, scene);
     look.scene = scene;
     look.subject = findSubject(scene);
     byId("title").textContent = scene.input.replace(/\/+$/, "").split("/").pop() || scene.input;
@@ -304,10 +310,13 @@ async function statusChanged(status) {
     byId("part-name").textContent = scene.plain ? "Gaussians" : "anchors";
     fillViews(scene);
     if (first) {
+        look.view = camera.view = -1, look.photo = null;
         byId("renderer").value = scene.renderer;
         firstLook();
     } else {
         byId("view").value = look.view;
+        if (look.view >= 0)
+            await fetchPhoto(look.view).catch(fail); // of the same name; it may be another one after all
         changed();
     }
 }

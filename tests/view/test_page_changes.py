@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place. Usage: test_page_changes.py PROGRAM"""
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from page_support import STILL, check, make_run, opened, run_tests, start, stop  # noqa: E402
+
+PHOTO = "(c => String(c.getContext('2d').getImageData(0, 0, c.width, c.height).data))(document.getElementById('photo'))"
+
+
+def another_viewer(page, path):
+    """On the same port; until the page has noticed that the old one ended, and shows the new one."""
+    port = page.address.rstrip("/").rpartition(":")[2]
+    stop(page.server)
+    page.wait("gbtrace.training.gone")
+    page.server, _ = start(path, port=port)
+    page.wait("!gbtrace.training.gone")
+
+
+def other_photos(work):
+    """Fewer, then more of them; and the log is the other run's, from its begin."""
+    with open(work + "/run_few/log.csv", "a", encoding="utf-8") as log:
+        log.write(log_row(work + "/run_few").replace("60,", "61,", 1) * 3)
+    with opened(work + "/run") as page:
+        page.run("document.getElementById('view').value = 8; document.getElementById('view').dispatchEvent(new Event('change'))")
+        page.wait(f"gbtrace.look.view === 8 && gbtrace.look.photo && {STILL}")
+        for path, views, rows in (("/run_few", 4, 4), ("/run", 9, 1)):
+            another_viewer(page, work + path)
+            page.wait(f"gbtrace.look.scene.views.length === {views} && gbtrace.look.photo && {STILL}")
+            size = page.run("[document.getElementById('photo').width, gbtrace.look.scene.views[gbtrace.look.view].width]")
+            check(path + ": a photo of it is shown", size[0] == size[1] and page.run("document.getElementById('message').hidden"), str(size))
+            page.wait(f"gbtrace.training.rows.length === {rows}")
+        page.press("KeyF", "f")
+        page.wait(STILL)
+        page.errors = []  # of the time between them
+
+
+def other_pixels(work):
+    """In a photo of the same name."""
+    with opened(work + "/run") as page:
+        page.wait("gbtrace.look.photo !== null")
+        before = page.run(PHOTO)
+        name = page.run("gbtrace.look.scene.views[gbtrace.look.view].name")
+        others = [file for file in os.listdir(work + "/scene/images") if not name.endswith(file)]
+        path = f"{work}/scene/images/{os.path.basename(name)}"
+        os.rename(path, work + "/kept")
+        with open(f"{work}/scene/images/{others[0]}", "rb") as other, open(path, "wb") as file:
+            file.write(other.read())
+        another_viewer(page, work + "/run")
+        page.wait(f"{PHOTO} !== {before!r}")
+        os.rename(work + "/kept", path)
+        page.errors = []
+
+
+def log_row(run):
+    with open(run + "/log.csv", encoding="utf-8") as log:
+        return log.readlines()[-1]
+
+
+def tests(work):
+    make_run(work, 96, 72)
+    make_run(work, 64, 48, 4, "_few")
+    other_photos(work)
+    other_pixels(work)
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(tests))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place. Usage: test_page_changes.py PROGRAM"""
+"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place, other pages.
+
+Usage: test_page_changes.py PROGRAM
+"""
 import os
 import sys
 
@@ -53,6 +56,19 @@ def other_pixels(work):
         page.errors = []
 
 
+def busy(work):
+    """Other pages have their pictures drawn, for six seconds."""
+    with opened(work + "/run") as page:
+        page.run("""(ask => { window.refused = 0; window.ask = ask;
+            window.fetch = async (what, how) => what.startsWith('render') ? (window.refused++, new Response('', { status: 503 })) : ask(what, how); })(window.fetch)""")
+        page.press("KeyF", "f")
+        page.wait("window.refused > 40")
+        check("it goes on asking", page.run("document.getElementById('message').hidden"), page.run("document.getElementById('message').textContent"))
+        page.run("gbtrace.camera.zoom(2); gbtrace.changed(); window.fetch = window.ask")
+        page.wait(STILL)
+        check("and gets what is wanted last", page.run("gbtrace.look.done.shot.origin.join() === gbtrace.camera.eye.join()"))
+
+
 def log_row(run):
     with open(run + "/log.csv", encoding="utf-8") as log:
         return log.readlines()[-1]
@@ -63,6 +79,7 @@ def tests(work):
     make_run(work, 64, 48, 4, "_few")
     other_photos(work)
     other_pixels(work)
+    busy(work)
 
 
 if __name__ == "__main__":

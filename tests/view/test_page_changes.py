@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place, other pages.
+"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place, other pages, a first model.
 
 Usage: test_page_changes.py PROGRAM
 """
 import os
+import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from page_support import STILL, check, make_run, opened, run_tests, start, stop  # noqa: E402
+from page_support import STILL, check, make_run, middle, opened, run_tests, start, stop  # noqa: E402
 
 PHOTO = "(c => String(c.getContext('2d').getImageData(0, 0, c.width, c.height).data))(document.getElementById('photo'))"
+
+MESSAGE = "document.getElementById('message').textContent"
 
 
 def another_viewer(page, path):
@@ -63,10 +66,38 @@ def busy(work):
             window.fetch = async (what, how) => what.startsWith('render') ? (window.refused++, new Response('', { status: 503 })) : ask(what, how); })(window.fetch)""")
         page.press("KeyF", "f")
         page.wait("window.refused > 40")
-        check("it goes on asking", page.run("document.getElementById('message').hidden"), page.run("document.getElementById('message').textContent"))
+        check("it goes on asking", page.run("document.getElementById('message').hidden"), page.run(MESSAGE))
         page.run("gbtrace.camera.zoom(2); gbtrace.changed(); window.fetch = window.ask")
         page.wait(STILL)
         check("and gets what is wanted last", page.run("gbtrace.look.done.shot.origin.join() === gbtrace.camera.eye.join()"))
+
+
+def before_the_first_model(work):
+    """What is pressed does no harm."""
+    os.mkdir(work + "/run_new")
+    shutil.copy(work + "/run/config", work + "/run_new")
+    with opened(work + "/run_new", until=f"{MESSAGE}.includes('not saved a model')") as page:
+        for code, key in (("KeyW", "w"), ("KeyG", "g"), ("KeyG", "g"), ("KeyC", "c"), ("KeyR", "r"), ("KeyF", "f"), ("KeyH", "h"), ("BracketRight", "]")):
+            page.key("keyDown", code, key)
+            page.run("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame)).then(() => true)")
+            page.key("keyUp", code, key)
+        page.drag(middle(page, "#stage"), (40, 10))
+        page.double_click(*middle(page, "#stage"))
+        for button in ("#copy", "#save", "#cameras", "#cameras"):
+            page.run(f"window.prompt = () => null; document.querySelector('{button}').click()")
+        check("no errors before there is a model", not page.errors, str(page.errors))
+        put(work + "/run/model.gbt", work + "/run_new/model.gbt")
+        page.wait(STILL)
+        before = page.run("gbtrace.camera.eye.join()")
+        page.key("keyDown", "KeyW", "w")
+        page.wait(f"gbtrace.camera.eye.join() !== '{before}'")
+        page.key("keyUp", "KeyW", "w")
+
+
+def put(file, place):
+    """At once, as training does."""
+    shutil.copy(file, place + ".new")
+    os.rename(place + ".new", place)
 
 
 def log_row(run):
@@ -80,6 +111,7 @@ def tests(work):
     other_photos(work)
     other_pixels(work)
     busy(work)
+    before_the_first_model(work)
 
 
 if __name__ == "__main__":

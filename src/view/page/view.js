@@ -336,7 +336,7 @@ function pixelAt(event) {
 
 async function pick(event) {
     const at = pixelAt(event);
-    if (at === null)
+    if (at === null || look.scene === null)
         return;
     const query = cameraQuery(at.width, at.height), stage = byId("stage").getBoundingClientRect(), ring = byId("ring");
     query.set("x", (at.x * at.width).toFixed(3));
@@ -390,6 +390,8 @@ const unitsPerPixel = () => camera.viewWidth(...pictureSize()) / byId("render").
 const radiansPerPixel = () => camera.fovOf(...pictureSize()) * Math.PI / 180 / byId("render").clientWidth;
 
 function fly(right, up, forward) { // half of the subject's radius in a second
+    if (look.subject === null)
+        return;
     const speed = 0.5 * look.subject.radius * 2 ** byId("speed").value;
     camera.move(right * speed, up * speed, forward * speed);
     moved();
@@ -437,7 +439,11 @@ byId("fov").addEventListener("input", () => {
 for (const id of ["compare", "output", "size", "background", "renderer", "preset", "moving", "samples", "transfer"])
     byId(id).addEventListener("change", () => changed());
 for (const id of ["grid", "cameras"])
-    byId(id).addEventListener("change", () => { drawLines(); describe(look.about, look.done); });
+    byId(id).addEventListener("change", () => {
+        drawLines();
+        if (look.about !== null)
+            describe(look.about, look.done);
+    });
 byId("speed").addEventListener("input", showControls);
 new ResizeObserver(() => look.subject !== null && changed()).observe(byId("stage"));
 if (words.get("transfer") === "jpeg")

@@ -13,6 +13,7 @@ from page_support import STILL, check, make_run, middle, opened, run_tests, star
 PHOTO = "(c => String(c.getContext('2d').getImageData(0, 0, c.width, c.height).data))(document.getElementById('photo'))"
 
 MESSAGE = "document.getElementById('message').textContent"
+FACTS = "document.getElementById('facts').textContent"
 
 
 def another_viewer(page, path):
@@ -73,7 +74,7 @@ def busy(work):
 
 
 def before_the_first_model(work):
-    """What is pressed does no harm."""
+    """What is pressed does no harm; files that are no models are named."""
     os.mkdir(work + "/run_new")
     shutil.copy(work + "/run/config", work + "/run_new")
     with opened(work + "/run_new", until=f"{MESSAGE}.includes('not saved a model')") as page:
@@ -86,8 +87,12 @@ def before_the_first_model(work):
         for button in ("#copy", "#save", "#cameras", "#cameras"):
             page.run(f"window.prompt = () => null; document.querySelector('{button}').click()")
         check("no errors before there is a model", not page.errors, str(page.errors))
+        put(work + "/run/config", work + "/run_new/model.gbt")
+        page.wait(f"{MESSAGE}.includes('not a gbtrace file')")
         put(work + "/run/model.gbt", work + "/run_new/model.gbt")
-        page.wait(STILL)
+        page.wait(f"{STILL} && !{FACTS}.includes('not a gbtrace file')")
+        put(work + "/run/config", work + "/run_new/model.gbt")
+        page.wait(f"{FACTS}.includes('anchors') && {FACTS}.includes('not a gbtrace file')")
         before = page.run("gbtrace.camera.eye.join()")
         page.key("keyDown", "KeyW", "w")
         page.wait(f"gbtrace.camera.eye.join() !== '{before}'")

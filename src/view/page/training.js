@@ -4,7 +4,7 @@
 const pollMs = 1000, liveSeconds = 15;
 
 export class Training {
-    // changed(status): the model is another one, or there is one at last.
+    // changed(status): the model is another one, or there is one at last, or there is something else to say about it.
     constructor(part, now, chart, live, changed) {
         Object.assign(this, { part, now, chart, live, changed });
         this.forget();
@@ -28,8 +28,8 @@ export class Training {
             if (status.log_bytes !== this.bytes)
                 await this.readLog();
             this.describe(status);
-            if (status.version !== this.version || this.gone) {
-                this.version = status.version;
+            if (status.version !== this.version || status.note !== this.note || this.gone) {
+                this.version = status.version, this.note = status.note;
                 this.changed(status);
             }
             this.gone = false;

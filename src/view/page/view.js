@@ -304,8 +304,8 @@ async function statusChanged(status) {
     look.subject = findSubject(scene);
     byId("title").textContent = scene.input.replace(/\/+$/, "").split("/").pop() || scene.input;
     document.title = `${byId("title").textContent} – gbtrace`;
-    byId("facts").textContent = scene.plain ? `${scene.gaussians.toLocaleString("en")} Gaussians` :
-        `${scene.anchors.toLocaleString("en")} anchors · step ${status.iterations}${status.note ? " · " + status.note : ""}`;
+    const facts = scene.plain ? [`${scene.gaussians.toLocaleString("en")} Gaussians`] : [`${scene.anchors.toLocaleString("en")} anchors`, `step ${status.iterations}`];
+    byId("facts").textContent = facts.concat(status.note || []).join(" · ");
     byId("facts").title = byId("facts").textContent;
     byId("part-name").textContent = scene.plain ? "Gaussians" : "anchors";
     fillViews(scene);

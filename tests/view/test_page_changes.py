@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place, other pages, a first model.
+"""tests/view/test_page_changes.py -- what changes under an open page: another run in the viewer's place, no photo, other pages, a first model.
 
 Usage: test_page_changes.py PROGRAM
 """
@@ -60,6 +60,24 @@ def other_pixels(work):
         page.errors = []
 
 
+def no_photo(work):
+    """It is said; the difference to nothing is not drawn; R tries again."""
+    name, note = "gbtrace.look.scene.views[gbtrace.look.view].name", "document.getElementById('compare-note').textContent"
+    with opened(work + "/run") as page:
+        page.run("document.querySelector('input[name=compare][value=difference]').click()")
+        page.wait(f"{STILL} && gbtrace.look.psnr > 10")
+        os.rename(work + "/scene/images", work + "/scene/gone")
+        page.run("document.getElementById('next').click()")
+        page.wait(f"{note}.startsWith('No photo: ') && {note}.includes({name}) && gbtrace.look.psnr === null && {STILL}")
+        page.run("document.querySelector('input[name=compare][value=beside]').click()")
+        page.wait(f"{STILL} && {note}.startsWith('No photo: ')")
+        check("the render is alone", page.run("document.getElementById('photo-box').hidden && gbtrace.look.about.width > 96"))
+        os.rename(work + "/scene/gone", work + "/scene/images")
+        page.press("KeyR", "r")
+        page.wait(f"{STILL} && !document.getElementById('photo-box').hidden && !{note}.includes('No photo')")
+        page.errors = []  # "Failed to load resource"
+
+
 def busy(work):
     """Other pages have their pictures drawn, for six seconds."""
     with opened(work + "/run") as page:
@@ -115,6 +133,7 @@ def tests(work):
     make_run(work, 64, 48, 4, "_few")
     other_photos(work)
     other_pixels(work)
+    no_photo(work)
     busy(work)
     before_the_first_model(work)
 

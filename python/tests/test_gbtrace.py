@@ -67,6 +67,11 @@ class Balls(unittest.TestCase):
             self.assertEqual(len(answers), 60)
             for i in range(60):
                 np.testing.assert_array_equal(answers[i], np.flatnonzero(wanted[i]))
+                np.testing.assert_array_equal(answers[i - 60], answers[i])
+            self.assertEqual([which.tolist() for which in answers], [answers[i].tolist() for i in range(60)])
+            for i in (60, -61):
+                with self.assertRaisesRegex(IndexError, rf"query {i} \(there are 60\)"):
+                    answers[i]
 
     def test_rays(self):
         m = self.position[None] - self.points[:, None]

@@ -208,6 +208,8 @@ function showControls() {
     const compares = compareMode() !== "off" && byId("size").value === "window";
     byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : compares ? "Of the photo's size, pixel for pixel." : look.noPhoto;
     byId("model").value = camera.view >= 0 ? "photo" : camera.model;
+    byId("copy-note").hidden = camera.view < 0 || camera.model === "equirectangular";
+    byId("copy-note").textContent = `The copy is a ${camera.model} like the photo's lens, without its centre and distortion.`;
     byId("fov-row").hidden = camera.view >= 0 || camera.model === "equirectangular";
     byId("fov").max = camera.model === "fisheye" ? 360 : 150;
     byId("fov").value = fov;

@@ -169,8 +169,11 @@ def call(name, *arguments):
 
 
 def encode(path):
-    """A path as C has it."""
-    return os.fsencode(path)
+    """A path as C has it, which ends at the first NUL."""
+    encoded = os.fsencode(path)
+    if b"\0" in encoded:
+        raise ValueError(f"{path!r}: a NUL in a path")
+    return encoded
 
 
 def optional(path):

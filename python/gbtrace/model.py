@@ -119,6 +119,8 @@ class Model:
     @settings.setter
     def settings(self, settings):
         lib.wanted(settings, "settings", Settings, ", as model.settings._replace(footprint=0)")
+        if len(settings.background) != 3:
+            raise ValueError(f"background: {settings.background!r} (wanted red, green and blue)")
         struct = lib.CModelSettings((c.c_float * 3)(*settings.background), *settings[1:])
         lib.call("gbt_model_set_settings", self._open(), c.byref(struct))
 

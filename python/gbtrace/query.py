@@ -2,23 +2,29 @@
 """Balls and anchors by place."""
 
 import ctypes as c
-from typing import NamedTuple
+from dataclasses import dataclass
+from operator import index as as_index
 
 import numpy as np
 
 from gbtrace import _library as lib
 
 
-class Answers(NamedTuple):
-    """Answers of many queries: those of query i are index[first[i]:first[i + 1]], ascending."""
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Answers of many queries: those of query i are index[first[i]:first[i + 1]], ascending. A sequence: answers[i], for which in answers."""
 
     first: np.ndarray  # (queries + 1,)
     index: np.ndarray  # which balls
     value: np.ndarray  # distance to the centre; of rays the t of the point of the segment that is nearest to the centre
 
     def __getitem__(self, i):
-        """The balls that answer query i."""
-        return self.index[self.first[i]:self.first[i + 1]] if isinstance(i, (int, np.integer)) else tuple(self)[i]
+        """The balls that answer query i; of the last one for i = -1."""
+        try:
+            query = range(len(self))[as_index(i)]
+        except IndexError:
+            raise IndexError(f"query {i} (there are {len(self)})") from None
+        return self.index[self.first[query]:self.first[query + 1]]
 
     def __len__(self):
         return len(self.first) - 1

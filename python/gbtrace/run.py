@@ -25,9 +25,16 @@ def train(data, run, **settings):
     Settings have the names of RUN/config, with _ for -: train("photos", "run", iterations=2000, downscale=2). Progress goes to stderr; Ctrl-C
     saves a checkpoint and raises KeyboardInterrupt. train(None, "run", resume=True, iterations=4000) goes on with a run, here to 4000 steps.
     """
-    lines = "".join(f"{key.replace('_', '-')} = {int(value) if isinstance(value, bool) else value}\n" for key, value in settings.items())
+    lines = "".join(_setting(key.replace("_", "-"), int(value) if isinstance(value, bool) else value) for key, value in settings.items())
     lib.call("gbt_train_with", lib.optional(data), lib.encode(run), lines.encode())
     return Model(run)
+
+
+def _setting(name, value):
+    line = f"{name} = {value}\n"
+    if line.count("\n") != 1 or "\0" in line:
+        raise ValueError(f"{name}: {value!r} (wanted one line, without NUL)")
+    return line
 
 
 def evaluate(run, data=None, lpips=None, json=None):

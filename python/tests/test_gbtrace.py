@@ -67,6 +67,11 @@ class Balls(unittest.TestCase):
             self.assertEqual(len(answers), 60)
             for i in range(60):
                 np.testing.assert_array_equal(answers[i], np.flatnonzero(wanted[i]))
+                np.testing.assert_array_equal(answers[i - 60], answers[i])
+            self.assertEqual([which.tolist() for which in answers], [answers[i].tolist() for i in range(60)])
+            for i in (60, -61):
+                with self.assertRaisesRegex(IndexError, rf"query {i} \(there are 60\)"):
+                    answers[i]
 
     def test_rays(self):
         m = self.position[None] - self.points[:, None]
@@ -156,6 +161,13 @@ class Cameras(unittest.TestCase):
             gbtrace.Camera("FISHY", 4, 4)
         with self.assertRaisesRegex(ValueError, "wanted 4 for PINHOLE"):
             gbtrace.Camera("PINHOLE", 4, 4, (1, 2))
+        for width, height, says in ((2**32 + 4, 4, "width: 4294967300"), (4, -1, r"height: -1 \(wanted 0 to 2147483647\)")):
+            with self.assertRaisesRegex(ValueError, says):
+                gbtrace.Camera("PINHOLE", width, height, (1, 1, 1, 1))
+        for width, height, says in ((0, 0, r"width: 0 \(wanted 1 to"), (4, -1, "height: -1"), (2**32 + 4, 4, "width: 4294967300")):
+            with self.assertRaisesRegex(ValueError, says):
+                a_camera().resized(width, height)
+        self.assertEqual(a_camera().resized(np.int64(20), 15).width, 20)
         with self.assertRaisesRegex(ValueError, "target"):
             a_camera().looking_at((0, 0, 0), (0, 0, 0))
 
@@ -230,6 +242,8 @@ class Trained(unittest.TestCase):
         for wrong in (gbtrace.Model, gbtrace.evaluate, gbtrace.export):
             with self.assertRaisesRegex(TypeError, "NoneType"):
                 wrong(None)
+            with self.assertRaisesRegex(ValueError, "a NUL in a path"):
+                wrong(MODEL + "\0.bak")
 
     def test_settings(self):
         camera = a_camera(8, 8).looking_at((0, 0, 1e4), (0, 0, 2e4))  # nothing there
@@ -237,6 +251,9 @@ class Trained(unittest.TestCase):
         np.testing.assert_array_equal(self.model.render(camera)[0, 0], np.float32((0.25, 0.5, 1)))
         with self.assertRaisesRegex(gbtrace.ArgumentError, "footprint"):
             self.model.settings = self.model.settings._replace(footprint=-1)
+        for background in ((), (0.5, 0.5), (0, 0, 0, 1)):
+            with self.assertRaisesRegex(ValueError, r"background: .* \(wanted red, green and blue\)"):
+                self.model.settings = self.model.settings._replace(background=background)
 
     def test_models_on_threads(self):
         camera = self.model.views()[0].camera
@@ -327,6 +344,9 @@ class Runs(unittest.TestCase):
             gbtrace.train("/nowhere", SCRATCH / "run", no_such_setting=3)
         with self.assertRaises(gbtrace.Error):
             gbtrace.train("/nowhere", SCRATCH / "run", iterations=3)
+        for settings in ({"init": "gb\niterations = 5"}, {"init": "gb\0"}, {"init = gb\niterations": 5}):
+            with self.assertRaisesRegex(ValueError, "wanted one line, without NUL"):
+                gbtrace.train("/nowhere", SCRATCH / "run", **settings)
 
     def test_train(self):
         model = gbtrace.train(os.environ["GBT_DATA"], SCRATCH / "run", iterations=3, downscale=2, grow=False)

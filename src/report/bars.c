@@ -110,6 +110,12 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
     stack s;
     char x_label[64];
     average(x, count, layers, layer_count, &s);
+    if (s.count == 1) { /* a single row is the mean of all the time before it */
+        s.x[1] = s.x[0], s.x[0] = 0;
+        for (size_t k = 0; k <= s.layer_count; k++)
+            s.top[k][1] = s.top[k][0];
+        s.count = 2;
+    }
     snprintf(x_label, sizeof x_label, "training time, %s", x_unit);
     plot p = {.left = CHART_LEFT,
               .right = CHART_RIGHT,

@@ -30,9 +30,18 @@ static void draw_marks(text *out, const line_chart *c, const plot *p)
     text_add(out, "</g>");
 }
 
+static void draw_dot(text *out, const plot *p, int color, double x, double y)
+{
+    text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"", color & 3, plot_x(p, x),
+                plot_y(p, y));
+}
+
+/* Of one point there is no line: a dot. */
 static void draw_line(text *out, const chart_series *line, const plot *p)
 {
     const size_t per_point = (line->count + PATH_POINTS - 1) / PATH_POINTS;
+    size_t points = 0;
+    double last_x = 0, last_y = 0;
     bool is_open = false;
     text_format(out, "<path class=\"%s c%d\" d=\"", line->style == CHART_FAINT ? "faint" : "line",
                 line->color & 3);
@@ -44,10 +53,17 @@ static void draw_line(text *out, const chart_series *line, const plot *p)
                 y += line->y[j];
                 n++;
             }
-        if (n > 0)
-            plot_line_to(out, p, &is_open, x / n, y / n); /* a gap (a score between two rows) is bridged */
+        if (n == 0) /* a gap (a score between two rows) is bridged */
+            continue;
+        last_x = x / n, last_y = y / n;
+        plot_line_to(out, p, &is_open, last_x, last_y);
+        points++;
     }
     text_add(out, "\"/>");
+    if (points != 1 || line->style == CHART_FAINT)
+        return;
+    draw_dot(out, p, line->color, last_x, last_y);
+    text_add(out, "/>");
 }
 
 static void add_value(text *out, const line_chart *c, double y)
@@ -63,8 +79,8 @@ static void draw_dots(text *out, const line_chart *c, const chart_series *line, 
     for (size_t i = 0; i < line->count; i++) {
         if (!plot_can_show(p, line->x[i], line->y[i]))
             continue;
-        text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"><title>", line->color & 3,
-                    plot_x(p, line->x[i]), plot_y(p, line->y[i]));
+        draw_dot(out, p, line->color, line->x[i], line->y[i]);
+        text_add(out, "><title>");
         text_escaped(out, line->name != NULL ? line->name : "");
         text_add(out, " ");
         add_value(out, c, line->y[i]);

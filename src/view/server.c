@@ -13,6 +13,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/stop_signal.h"
 #include "data/number.h"
 #include "view/connections.h"
 #include "view/http.h"
@@ -144,7 +145,8 @@ static void *watch_clients(void *context)
         pthread_mutex_lock(&s->lock);
         go_on = !s->is_closing;
         connections_shut_slow(&s->clients);
-        if (s->working_for != NULL && connections_has_left(&s->clients, s->working_for))
+        if (stop_signal_seen() ||
+            (s->working_for != NULL && connections_has_left(&s->clients, s->working_for)))
             atomic_store(&s->nobody_waits, true);
         pthread_mutex_unlock(&s->lock);
         if (go_on)

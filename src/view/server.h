@@ -52,8 +52,8 @@ void server_set_status(server *s, char *json);
 server_job *server_next(server *s, double seconds);
 const request *server_request(const server_job *job);
 
-/** True, in place, as soon as whoever asked for the job of the last server_next() has left: what is made for
-   it may stop. */
+/** True, in place, as soon as whoever asked for the job of the last server_next() has left, or the program is
+   to stop: what is made for it may stop. */
 const atomic_bool *server_nobody_waits(const server *s);
 
 /** In place of SERVER_REQUEST_SECONDS, from the next connection on. For tests. */

@@ -407,6 +407,33 @@ static void bare_page(void **state)
     free(e.views);
 }
 
+static char *page_of_log(int rows)
+{
+    write_log(rows, "");
+    evaluation e = make_views(1);
+    json_t *metrics = full_metrics();
+    char *page = write_report(&e, metrics);
+    json_decref(metrics);
+    free(e.views);
+    return page;
+}
+
+/* A dot for each of the seven lines, and layers over the time before it. */
+static void one_row(void **state)
+{
+    (void)state;
+    char *page = page_of_log(1);
+    assert_int_equal(occurrences(page, "n/a: nothing was"), 0);
+    assert_int_equal(occurrences(page, "r=\"4\"/>"), 7);
+    const char *layer = strstr(page, "<path class=\"area s0\" d=\"M50.0 ");
+    assert_non_null(layer);
+    assert_int_equal(strncmp(strstr(layer, "L"), "L448.0 ", 7), 0);
+    free(page);
+    page = page_of_log(50);
+    assert_int_equal(occurrences(page, "r=\"4\"/>"), 0);
+    free(page);
+}
+
 /* ---- the scene ---- */
 
 enum { POINTS = 200, VIEWS = 5 };
@@ -1031,6 +1058,7 @@ int main(void)
         .name = rows[i].name, .test_func = function, .initial_state = (void *)(uintptr_t)&rows[i]}
     ADD(whole_page);
     ADD_ROWS(bare_page, bare_cases);
+    ADD(one_row);
     ADD(scene_on_the_page);
     ADD(maps_lie_along_the_cameras);
     ADD(layers_have_the_logged_heights);

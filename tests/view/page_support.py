@@ -27,32 +27,42 @@ def gbtrace(*arguments):
     return subprocess.run([program, *arguments], check=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True).stdout
 
 
-def make_run(work, width, height):
-    """A scene of 9 views, and a run on it: work/run."""
-    size = ("--width", str(width), "--height", str(height))
-    gbtrace("make-scene", "tabletop", "-o", work + "/scene", *size, "--views", "9", "--samples", "1", "--points", "300")
-    gbtrace("train", work + "/scene", "-o", work + "/run", "--iterations", "60")
+def make_run(work, width, height, views=9, name=""):
+    """A scene, and a run on it: work/run."""
+    scene, run, size = f"{work}/scene{name}", f"{work}/run{name}", ("--width", str(width), "--height", str(height))
+    gbtrace("make-scene", "tabletop", "-o", scene, *size, "--views", str(views), "--samples", "1", "--points", "300")
+    gbtrace("train", scene, "-o", run, "--iterations", "60")
+
+
+def start(path, *options, port="0"):
+    """The viewer, when it listens, and the page's address."""
+    server = subprocess.Popen([program, "view", path, "--port", port, *options], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    return server, server.stdout.readline().strip()
+
+
+def stop(server):
+    if server.poll() is None:
+        server.send_signal(signal.SIGINT)
+    server.wait()
 
 
 @contextlib.contextmanager
-def opened(path, *options, width=1200, height=800, dark=False, scale=1, phone=False):
+def opened(path, *options, width=1200, height=800, dark=False, scale=1, phone=False, until=STILL):
     """The page of `gbtrace view PATH`; page.server and page.address are the viewer's."""
-    server = subprocess.Popen([program, "view", path, "--port", "0", *options], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    server, address = start(path, *options)
     page = browser.Browser(browser.find(), width, height, dark, scale, phone)
-    page.server, page.address = server, server.stdout.readline().strip()
+    page.server, page.address = server, address
     try:
         page.open(page.address)
-        page.wait(STILL)
+        page.wait(until)
         yield page
-        if server.poll() is None:
+        if page.server.poll() is None:
             check("no errors in the page", not page.errors, str(page.errors))
     except browser.PageError as error:
         check("the page", False, str(error))
     finally:
         page.close()
-        if server.poll() is None:
-            server.send_signal(signal.SIGINT)
-        server.wait()
+        stop(page.server)
 
 
 def box(page, selector):

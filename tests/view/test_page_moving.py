@@ -85,6 +85,11 @@ def fit_and_start(page):
     page.press("KeyH", "h")
     page.wait(STILL)
     check("H is the start", page.run(CAMERA) == start)
+    for key, hidden in (("f", True), ("h", False)):
+        page.press("Key" + key.upper(), key)
+        note = page.run("(e => [e.hidden, e.textContent])(document.getElementById('copy-note'))")
+        check("at a photo it is said that a copied camera has not all of its lens", note[0] == hidden and "like the photo's lens" in note[1], str(note))
+    page.wait(STILL)
 
 
 def drawn(page):

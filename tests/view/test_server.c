@@ -4,6 +4,7 @@
 #include "view/http_client.h"
 
 #include "base/file.h"
+#include "base/stop_signal.h"
 #include "view/server.h"
 
 static server *s;
@@ -374,6 +375,24 @@ static void it_is_known_that_nobody_waits(void **state)
     expect(next, 200, "here");
 }
 
+static void a_signal_ends_what_is_made(void **state)
+{
+    (void)state;
+    stop_signal_guard signals;
+    stop_signal_catch(&signals, NULL, NULL);
+    const int fd = http_ask(port, "/render?view=0");
+    server_job *job = wait_for_job(s);
+    assert_false(atomic_load(server_nobody_waits(s)));
+    raise(SIGINT);
+    while (!atomic_load(server_nobody_waits(s)))
+        usleep(10000);
+    stop_signal_release(&signals);
+    stop_signal_catch(&signals, NULL, NULL); /* forgets it */
+    stop_signal_release(&signals);
+    answer_with(s, job, "given up");
+    expect(fd, 200, "given up");
+}
+
 static void the_end_answers_all(void **state)
 {
     (void)state;
@@ -502,6 +521,7 @@ int main(void)
         cmocka_unit_test(slow_clients_are_shut),
         cmocka_unit_test(one_address_leaves_room_for_others),
         cmocka_unit_test(it_is_known_that_nobody_waits),
+        cmocka_unit_test(a_signal_ends_what_is_made),
         cmocka_unit_test(the_end_answers_all),
         cmocka_unit_test(others_need_the_token),
         cmocka_unit_test(an_address_of_another_machine),

@@ -99,8 +99,8 @@ function listenToKeys(act) {
         const way = [0, 0, 0];
         for (const code of held)
             keysOf[code].forEach((v, i) => way[i] += v * seconds);
+        requestAnimationFrame(fly); // before, so that what goes wrong in a frame ends no flight
         act.fly(...way);
-        requestAnimationFrame(fly);
     };
     window.addEventListener("keydown", event => {
         if (isItsOwn(event) || event.ctrlKey || event.metaKey || event.altKey)

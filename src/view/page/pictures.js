@@ -3,16 +3,15 @@
 
 const frameMs = 70, wholeMs = 400, stillMs = 180, retryMs = 150, callMs = 5, leastSide = 240;
 
-// fetch() that waits: the server draws for one at a time, and lets an old picture go when a newer one is asked for.
-async function ask(query, signal) {
-    const begin = performance.now();
+// fetch() that waits: the server draws for one at a time, and lets an old picture go when a newer one is asked for, maybe by another page.
+async function ask(query, signal, isWanted) {
     for (;;) {
-        const response = await fetch("render?" + query, { signal });
+        const begin = performance.now(), response = await fetch("render?" + query, { signal });
         if (response.status === 503) {
             await response.arrayBuffer();
             await new Promise(done => setTimeout(done, retryMs));
-            if (performance.now() - begin > 5000)
-                throw new Error("busy");
+            if (!isWanted())
+                throw new DOMException("", "AbortError");
             continue;
         }
         if (!response.ok)
@@ -81,9 +80,9 @@ export class Pictures {
         query.set("sample", sample);
         this.asked = new AbortController();
         this.askedAt = performance.now();
-        const answer = ask(query, this.asked.signal);
+        const generation = this.generation, answer = ask(query, this.asked.signal, () => generation === this.generation);
         answer.catch(() => {}); // run() tells, when it comes to it
-        return { generation: this.generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer };
+        return { generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer };
     }
 
     async run() {

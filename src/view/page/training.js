@@ -4,26 +4,32 @@
 const pollMs = 1000, liveSeconds = 15;
 
 export class Training {
-    // changed(status): the model is another one, or there is one at last.
+    // changed(status): the model is another one, or there is one at last, or there is something else to say about it.
     constructor(part, now, chart, live, changed) {
         Object.assign(this, { part, now, chart, live, changed });
+        this.forget();
+        this.version = -1;
+        this.poll();
+    }
+
+    forget() {
         this.bytes = 0;
         this.rest = "";
         this.columns = null;
         this.rows = [];
-        this.version = -1;
-        this.poll();
     }
 
     async poll() {
         try {
             const status = await (await fetch("status")).json();
+            if (this.gone)
+                this.forget(); // a server that was started again may show another run
             this.live.hidden = !(status.log_age >= 0 && status.log_age < liveSeconds);
             if (status.log_bytes !== this.bytes)
                 await this.readLog();
             this.describe(status);
-            if (status.version !== this.version || this.gone) {
-                this.version = status.version;
+            if (status.version !== this.version || status.note !== this.note || this.gone) {
+                this.version = status.version, this.note = status.note;
                 this.changed(status);
             }
             this.gone = false;
@@ -41,7 +47,7 @@ export class Training {
             return;
         const bytes = await response.arrayBuffer();
         if (JSON.parse(response.headers.get("X-Picture")).from === 0)
-            this.columns = null, this.rows = [], this.rest = "", this.bytes = 0;
+            this.forget();
         this.bytes += bytes.byteLength;
         const lines = (this.rest + new TextDecoder().decode(bytes)).split("\n");
         this.rest = lines.pop();

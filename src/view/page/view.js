@@ -16,7 +16,7 @@ if (words.has("token")) // the server has made a cookie of it
     history.replaceState(null, "", location.pathname);
 const camera = new Camera();
 const look = {
-    scene: null, subject: null, view: -1, photo: null, split: 0.5, // what there is, and beside what
+    scene: null, subject: null, view: -1, photo: null, noPhoto: "", split: 0.5, // what there is, and beside what; why there is no photo
     done: null, about: null, first: null, sum: null, values: null, range: null, psnr: null, pointed: undefined, // what is shown
 };
 
@@ -84,18 +84,20 @@ function layout() {
 
 // ---- what is asked for, what comes ------------------------------------------------------------------------------------------------
 
-// A photo can lie over the render only where the render has its camera.
+// A photo can lie over the render only where it can be read and the render has its camera.
 function compareMode() {
     const mode = chosen("compare");
-    return look.view < 0 ? "off" : mode === "beside" || camera.view === look.view ? mode : "off";
+    return look.view < 0 || look.noPhoto !== "" ? "off" : mode === "beside" || camera.view === look.view ? mode : "off";
 }
 
 function cameraQuery(width, height) {
     return new URLSearchParams(camera.view >= 0 ? { view: camera.view, width, height } : { camera: JSON.stringify(camera.file(width, height)) });
 }
 
+const lacksPhoto = () => compareMode() === "difference" && look.photo === null; // it will come
+
 function wanted() {
-    if (look.scene === null)
+    if (look.scene === null || lacksPhoto())
         return null;
     const [width, height] = pictureSize(), output = chosen("output"), color = output === "color", alone = compareMode() === "off";
     const query = (w, h) => {
@@ -137,6 +139,8 @@ function average(pixels, done) {
 }
 
 async function show(picture, done) {
+    if (lacksPhoto())
+        return;
     const { about, bytes } = picture, output = done.output, canvas = byId("render");
     let pixels;
     look.values = null, look.range = null, look.pointed = undefined;
@@ -152,7 +156,7 @@ async function show(picture, done) {
         canvas.width = about.width, canvas.height = about.height;
     let seen = pixels;
     look.psnr = null;
-    if (compareMode() === "difference" && look.photo !== null && look.values === null) {
+    if (compareMode() === "difference" && look.values === null) {
         seen = new Uint8ClampedArray(pixels.length);
         look.psnr = difference(pixels, photoPixels(about.width, about.height), seen);
     }
@@ -200,10 +204,12 @@ function fail(error) {
 const pictures = new Pictures(wanted, show, fail), lines = new Lines(byId("lines"));
 
 function showControls() {
-    const left = look.view >= 0 && chosen("compare") !== "off" && compareMode() === "off", fov = camera.fovOf(...pictureSize());
+    const left = look.view >= 0 && look.noPhoto === "" && chosen("compare") !== "off" && compareMode() === "off", fov = camera.fovOf(...pictureSize());
     const compares = compareMode() !== "off" && byId("size").value === "window";
-    byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : compares ? "Of the photo's size, pixel for pixel." : "";
+    byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : compares ? "Of the photo's size, pixel for pixel." : look.noPhoto;
     byId("model").value = camera.view >= 0 ? "photo" : camera.model;
+    byId("copy-note").hidden = camera.view < 0 || camera.model === "equirectangular";
+    byId("copy-note").textContent = `The copy is a ${camera.model} like the photo's lens, without its centre and distortion.`;
     byId("fov-row").hidden = camera.view >= 0 || camera.model === "equirectangular";
     byId("fov").max = camera.model === "fisheye" ? 360 : 150;
     byId("fov").value = fov;
@@ -225,17 +231,31 @@ function photoPixels(width, height) {
     return context.getImageData(0, 0, width, height).data;
 }
 
-async function fetchPhoto(view) {
+async function readPhoto(view) {
     const response = await fetch(`photo?view=${view}&format=raw`);
     if (!response.ok)
         throw new Error((await response.text()).trim());
-    const about = JSON.parse(response.headers.get("X-Picture")), bytes = await response.arrayBuffer();
+    const about = JSON.parse(response.headers.get("X-Picture"));
+    return new ImageData(new Uint8ClampedArray(await response.arrayBuffer()), about.width, about.height);
+}
+
+async function fetchPhoto(view) {
+    const [photo, why] = await readPhoto(view).then(photo => [photo, ""], error => [null, `No photo: ${error.message.replace(/^error: /, "")}`]);
     if (view !== look.view)
         return;
     const canvas = byId("photo");
-    canvas.width = about.width, canvas.height = about.height;
-    canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(bytes), about.width, about.height), 0, 0);
-    look.photo = canvas;
+    look.photo = photo !== null ? canvas : null, look.noPhoto = why;
+    if (photo !== null) {
+        canvas.width = photo.width, canvas.height = photo.height;
+        canvas.getContext("2d").putImageData(photo, 0, 0);
+    }
+    changed();
+}
+
+// Whether two scenes have the same photo where one is looked at; its pose may be refined meanwhile.
+function hasSamePhoto(a, b) {
+    const of = scene => ["name", "width", "height", "lens"].map(key => scene.views[look.view]?.[key]).join();
+    return a.input === b.input && of(a) === of(b);
 }
 
 // The lens of a camera file that comes nearest to one of a data set. Its scale in the middle is the photo's: fov_x_deg is a pinhole's with it.
@@ -248,16 +268,16 @@ function takeLens(view) {
 
 function goTo(index) {
     const view = look.scene.views[index];
-    const other = look.view !== index;
+    const other = look.view !== index || look.noPhoto !== "";
     look.view = index;
     camera.place(view.camera, look.subject.middle);
     camera.view = index;
     takeLens(view);
     byId("view").value = index;
     if (other) {
-        look.photo = null;
+        look.photo = null, look.noPhoto = "";
         fillSizes();
-        fetchPhoto(index).then(() => changed(), fail);
+        fetchPhoto(index);
     }
     changed();
 }
@@ -293,22 +313,26 @@ async function statusChanged(status) {
         return fail(new Error("gbtrace view has ended; start it again to go on."));
     if (status.version === 0)
         return fail(new Error(status.note));
-    const scene = await (await fetch("scene")).json(), first = look.scene === null;
+    const scene = await (await fetch("scene")).json(), first = look.scene === null || !hasSamePhoto(look.scene, scene);
     look.scene = scene;
     look.subject = findSubject(scene);
     byId("title").textContent = scene.input.replace(/\/+$/, "").split("/").pop() || scene.input;
     document.title = `${byId("title").textContent} – gbtrace`;
-    byId("facts").textContent = scene.plain ? `${scene.gaussians.toLocaleString("en")} Gaussians` :
-        `${scene.anchors.toLocaleString("en")} anchors · step ${status.iterations}${status.note ? " · " + status.note : ""}`;
+    const facts = scene.plain ? [`${scene.gaussians.toLocaleString("en")} Gaussians`] : [`${scene.anchors.toLocaleString("en")} anchors`, `step ${status.iterations}`];
+    byId("facts").textContent = facts.concat(status.note || []).join(" · ");
     byId("facts").title = byId("facts").textContent;
     byId("part-name").textContent = scene.plain ? "Gaussians" : "anchors";
     fillViews(scene);
     if (first) {
+        look.view = camera.view = -1, look.photo = null, look.noPhoto = "";
         byId("renderer").value = scene.renderer;
         firstLook();
     } else {
         byId("view").value = look.view;
-        changed();
+        if (look.view >= 0)
+            fetchPhoto(look.view); // of the same name; it may be another one after all
+        else
+            changed();
     }
 }
 
@@ -327,7 +351,7 @@ function pixelAt(event) {
 
 async function pick(event) {
     const at = pixelAt(event);
-    if (at === null)
+    if (at === null || look.scene === null)
         return;
     const query = cameraQuery(at.width, at.height), stage = byId("stage").getBoundingClientRect(), ring = byId("ring");
     query.set("x", (at.x * at.width).toFixed(3));
@@ -381,6 +405,8 @@ const unitsPerPixel = () => camera.viewWidth(...pictureSize()) / byId("render").
 const radiansPerPixel = () => camera.fovOf(...pictureSize()) * Math.PI / 180 / byId("render").clientWidth;
 
 function fly(right, up, forward) { // half of the subject's radius in a second
+    if (look.subject === null)
+        return;
     const speed = 0.5 * look.subject.radius * 2 ** byId("speed").value;
     camera.move(right * speed, up * speed, forward * speed);
     moved();
@@ -428,7 +454,11 @@ byId("fov").addEventListener("input", () => {
 for (const id of ["compare", "output", "size", "background", "renderer", "preset", "moving", "samples", "transfer"])
     byId(id).addEventListener("change", () => changed());
 for (const id of ["grid", "cameras"])
-    byId(id).addEventListener("change", () => { drawLines(); describe(look.about, look.done); });
+    byId(id).addEventListener("change", () => {
+        drawLines();
+        if (look.about !== null)
+            describe(look.about, look.done);
+    });
 byId("speed").addEventListener("input", showControls);
 new ResizeObserver(() => look.subject !== null && changed()).observe(byId("stage"));
 if (words.get("transfer") === "jpeg")

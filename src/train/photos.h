@@ -46,6 +46,10 @@ void photos_close(photos *p);
     for. The first failure in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
+/** Read the photos of `views` and keep none: what fails now would fail when they are read later. As many, on
+    as many threads, as photos_load() would read. */
+gbt_status photos_try(photos *p, const size_t *views, size_t count, gbt_error *err);
+
 /** Camera of a photo that is divided: its size is round(stated / divide), at least 1. */
 gbt_camera photo_camera_divided(const gbt_camera *stated, double divide);
 

@@ -263,6 +263,17 @@ static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
     return GBT_OK;
 }
 
+gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *any, gbt_error *err)
+{
+    *any = false;
+    for (size_t i = 0; i < count && !*any; i++) {
+        GBT_TRY(read_full(p, views[i], err));
+        const unsigned char *valid = p->full_valid[views[i]];
+        *any = valid == NULL || memchr(valid, 1, full_bytes(p, views[i]) / 3) != NULL;
+    }
+    return GBT_OK;
+}
+
 /* The marks of a photo at p->level, if it has any. Made before its pixels, which say that both are there. */
 static gbt_status resize_valid(photos *p, size_t view, const gbt_camera *camera, gbt_error *err)
 {

@@ -75,6 +75,9 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
                              gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err);
 
+/** Whether some pixel of these photos means something: reads them at full size until one is found. */
+gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *any, gbt_error *err);
+
 /** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was
     not finite; NULL: all. */
 const unsigned char *photos_valid(const photos *p, size_t view);

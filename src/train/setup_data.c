@@ -150,6 +150,20 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
         t->scene.views[0].camera.height, need.least / 0x1p20, need.whole / 0x1p20);
 }
 
+/* Nothing would be learned, and no loss would tell. */
+static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
+{
+    bool any;
+    GBT_TRY(photos_any_valid(&t->photos, t->train_views, t->train_count, &any, err));
+    if (any)
+        return GBT_OK;
+    return base_fail(
+        err, GBT_ERR_FORMAT,
+        "%s: masks or alpha channels leave no pixel of any photo to train on (wanted light where "
+        "a photo counts)",
+        t->scene.folder);
+}
+
 /* What is held out is read after the last step, to score it: what could not be read then is told now. The
    headers of all photos have been seen, which tell of files that are cut and of other shapes; damaged pixels
    are looked for in no more photos than are trained on, so that a run takes at most twice as long to start.
@@ -206,6 +220,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
+    GBT_TRY(need_valid_pixels(t, err));
     GBT_TRY(try_held_out(t, err));
     GBT_TRY(checkpoint_hash_photos(&t->scene, &t->photos_hash, err));
     t->extent = scene_camera_extent(&t->scene);

@@ -866,6 +866,43 @@ static void masked_photos(void **state)
     }
 }
 
+/* Light in any channel counts, and only where it is opaque: 1, 2, 3 and 4 channels. */
+static void masks_of_any_color(void **state)
+{
+    const char *folder = *state;
+    char photo[4096], mask_path[4096];
+    snprintf(photo, sizeof photo, "%s/p.png", folder);
+    snprintf(mask_path, sizeof mask_path, "%s/m.png", folder);
+    write_picture(folder, "p.png", 4, 1);
+    static const struct {
+        int channels;
+        float values[16];
+        unsigned valid;
+    } cases[] = {
+        {1, {0, 1, 0.4f, 0.6f}, 0xa},
+        {2, {1, 0, 1, 1, 1, 0.4f, 0.6f, 1}, 0xa},
+        {3, {0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0}, 0xe},
+        {3, {0.2f, 0.4f, 0.1f, 0.2f, 0.6f, 0.1f, 0.1f, 0, 1, 0.3f, 0.3f, 0.3f}, 0x6},
+        {4, {1, 1, 1, 0, 1, 0, 0, 1, 0, 0, 1, 0.4f, 0, 1, 0, 0.6f}, 0xa},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        const scene_view view = {
+            .name = photo, .path = photo, .mask_path = mask_path, .camera = {.width = 4, .height = 1}};
+        image im;
+        unsigned char *valid;
+        must(image_alloc(&im, 4, 1, cases[k].channels, &err));
+        memcpy(im.pixels, cases[k].values, 4 * (size_t)cases[k].channels * sizeof *im.pixels);
+        must(image_write(mask_path, &im, &err));
+        image_free(&im);
+        must(scene_read_photo_valid(&view, 4, 1, &im, &valid, &err));
+        for (unsigned i = 0; i < 4; i++)
+            if (valid[i] != (cases[k].valid >> i & 1))
+                fail_msg("case %zu, pixel %u", k, i);
+        mem_free(valid);
+        image_free(&im);
+    }
+}
+
 typedef struct real_case {
     const char *path, *source;
     size_t views, tests, points;
@@ -990,6 +1027,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(masks_of_any_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),
         cmocka_unit_test(extent_is_positive),
         cmocka_unit_test_setup_teardown(no_memory, make_temporary, remove_temporary),

@@ -237,6 +237,27 @@ static void a_black_mask_leaves_nothing(void **state)
     json_decref(metrics);
 }
 
+/* Masks the wrong way round, say. */
+static void black_masks_alone_are_refused(void **state)
+{
+    (void)state;
+    const char *folder = in_root("all_black");
+    scene s = open_maskable_scene(folder);
+    image black;
+    assert_ok(image_alloc(&black, 48, 36, 1, NULL));
+    memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
+    for (size_t i = 0; i < s.view_count; i++) {
+        char path[2 * PATH_SIZE];
+        snprintf(path, sizeof path, "%s/masks/%.60s.png", folder, s.views[i].name);
+        assert_ok(image_write(path, &black, NULL));
+    }
+    image_free(&black);
+    scene_free(&s);
+    const gbt_train_def def = run_def();
+    train_fails(folder, in_root("all_black_run"), &def, GBT_ERR_FORMAT,
+                "leave no pixel of any photo to train on");
+}
+
 static void write_grey(const char *path, int width, int height)
 {
     image im;
@@ -342,6 +363,7 @@ int main(void)
         cmocka_unit_test(masked_pixels_have_no_say),
         cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
+        cmocka_unit_test(black_masks_alone_are_refused),
         cmocka_unit_test(what_is_held_out_is_looked_at_first),
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
     };

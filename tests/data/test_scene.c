@@ -806,6 +806,49 @@ static void photo_alpha_and_nan(void **state)
     image_free(&im);
 }
 
+/* Colours of an EXR are times alpha already: the same photo as a PNG, where they are not. The last pixel
+   glows, and has no opacity. */
+static void alpha_of_an_exr(void **state)
+{
+    const char *folder = *state;
+    static const scene_alpha kinds[] = {SCENE_ALPHA_BLACK, SCENE_ALPHA_WHITE, SCENE_ALPHA_MASK};
+    static const float pixels[16] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f, 0.2f, 0.4f, 1, 0.8f, 0, 0, 0, 0},
+                       glow = 0.5f;
+    char path[2][4096];
+    image im;
+    must(image_alloc(&im, 4, 1, 4, &err));
+    for (int exr = 0; exr < 2; exr++) {
+        for (int i = 0; i < 16; i++)
+            im.pixels[i] = exr && i % 4 < 3 ? pixels[i] * pixels[i - i % 4 + 3] : pixels[i];
+        im.pixels[12] = exr ? glow : 0;
+        snprintf(path[exr], sizeof path[exr], "%s/alpha.%s", folder, exr ? "exr" : "png");
+        must(image_write(path[exr], &im, &err));
+    }
+    image_free(&im);
+    for (int k = 0; k < 3; k++) {
+        image read[2];
+        unsigned char *valid[2];
+        for (int exr = 0; exr < 2; exr++) {
+            const scene_view view = {
+                .name = path[exr], .path = path[exr], .alpha = kinds[k], .camera = {.width = 4, .height = 1}};
+            must(scene_read_photo_valid(&view, 4, 1, &read[exr], &valid[exr], &err));
+        }
+        for (int i = 0; i < 4; i++) {
+            const bool counts = kinds[k] != SCENE_ALPHA_MASK || pixels[4 * i + 3] >= 0.5f;
+            for (int exr = 0; exr < 2; exr++)
+                assert_true((valid[exr] == NULL || valid[exr][i]) == counts);
+            for (int c = 0; c < 3 && counts; c++) {
+                const float more = i == 3 && c == 0 ? glow : 0;
+                assert_true(fabsf(read[1].pixels[3 * i + c] - more - read[0].pixels[3 * i + c]) < 1e-6f);
+            }
+        }
+        for (int exr = 0; exr < 2; exr++) {
+            image_free(&read[exr]);
+            mem_free(valid[exr]);
+        }
+    }
+}
+
 /* A mask of 0 and 1, of 0 and 255, lossy, half the size; alpha as a mask, on white; and what is no mask. */
 static void masked_photos(void **state)
 {
@@ -1026,6 +1069,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(alpha_of_an_exr, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masks_of_any_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),

@@ -108,6 +108,53 @@ static void folder_layouts(void **state)
     scene_free(&s);
 }
 
+/* nerfstudio keeps the model in colmap/, where a transforms.json beside it wins; models elsewhere are named.
+ */
+static void colmap_elsewhere(void **state)
+{
+    const char *folder = *state;
+    scene s;
+    write_model(folder, false, true);
+    move(folder, "sparse", "colmap/sparse");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-bin");
+    assert_int_equal(s.view_count, VIEW_COUNT);
+    scene_free(&s);
+    write_text(folder, "transforms.json",
+               "{\"fl_x\": 8, \"frames\": [{\"file_path\": \"images/v1.png\", \"transform_matrix\": "
+               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "transforms");
+    scene_free(&s);
+    unlink(inside(folder, "transforms.json", 0));
+
+    char data[4096], says[3][4096];
+    snprintf(data, sizeof data, "%s", inside(folder, "", 0));
+    if (data[strlen(data) - 1] == '/')
+        data[strlen(data) - 1] = '\0';
+    snprintf(says[0], sizeof says[0],
+             "a COLMAP model is in %.100s/sparse/1 (wanted: moved to %.100s/sparse/0)", data, data);
+    snprintf(says[1], sizeof says[1],
+             "a COLMAP model is in %.100s/dense/sparse (wanted the folder %.100s/dense)", data, data);
+    snprintf(says[2], sizeof says[2],
+             "a COLMAP model is in %.100s/a/b/sparse/0 (wanted the folder %.100s/a/b)", data, data);
+    static const char *const moves[3][2][2] = {
+        {{"colmap/sparse/0", "sparse/1"}, {"images/v1.png", "images/v1.png"}},
+        {{"sparse/1", "dense/sparse"}, {"images", "dense/images"}},
+        {{"dense/sparse", "a/b/sparse/0"}, {"dense/images", "a/b/images"}}};
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 2; k++)
+            move(folder, moves[i][k][0], moves[i][k][1]);
+        gbt_error err = {0};
+        assert_int_equal(scene_load(data, NULL, &s, &err), GBT_ERR_FORMAT);
+        check_message(GBT_ERR_FORMAT, &err);
+        if (strstr(err.text, says[i]) == NULL)
+            fail_msg("%s", err.text);
+    }
+    must(scene_load(inside(folder, "a/b", 0), NULL, &s, &err));
+    scene_free(&s);
+}
+
 static void binary_is_preferred(void **state)
 {
     const char *folder = *state;
@@ -1057,6 +1104,7 @@ int main(void)
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test_setup_teardown(recentred, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(folder_layouts, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(colmap_elsewhere, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(binary_is_preferred, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(missing_photos, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masks_are_found, make_temporary, remove_temporary),

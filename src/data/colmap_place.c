@@ -97,8 +97,9 @@ gbt_status colmap_place_check(const char *folder, gbt_error *err)
     if ((find_data_set(model, "/colmap/sparse/0", data) || find_data_set(model, "/sparse/0", data) ||
          find_data_set(model, "/sparse", data)) &&
         strlen(data) > strlen(folder))
-        return base_fail(err, GBT_ERR_FORMAT, "%.150s: a COLMAP model is in %.150s (wanted the folder %.150s)",
-                         folder, model, data);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%.150s: a COLMAP model is in %.150s (wanted the folder %.150s)", folder, model,
+                         data);
     return base_fail(err, GBT_ERR_FORMAT,
                      "%.150s: a COLMAP model is in %.150s (wanted: moved to %.150s/sparse/0)", folder, model,
                      folder);

@@ -19,7 +19,8 @@
 gbt_status colmap_place_find(const char *folder, bool of_nerfstudio, char *model, size_t size,
                              const char **ending, gbt_error *err);
 
-/** When some other folder below this one holds a COLMAP model: GBT_ERR_FORMAT, and what to do. Else GBT_OK. */
+/** When some other folder below this one holds a COLMAP model: GBT_ERR_FORMAT, and what to do. Else GBT_OK.
+ */
 gbt_status colmap_place_check(const char *folder, gbt_error *err);
 
 #endif

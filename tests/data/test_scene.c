@@ -128,7 +128,7 @@ static void colmap_elsewhere(void **state)
     scene_free(&s);
     unlink(inside(folder, "transforms.json", 0));
 
-    char data[4096], says[3][4096];
+    char data[8192], says[3][512];
     snprintf(data, sizeof data, "%s", inside(folder, "", 0));
     if (data[strlen(data) - 1] == '/')
         data[strlen(data) - 1] = '\0';
@@ -779,6 +779,43 @@ static void transforms_masks_and_split(void **state)
     }
 }
 
+/* Backslashes are slashes where nothing has the name as it is written. */
+static void transforms_from_windows(void **state)
+{
+    const char *folder = *state;
+    write_picture(folder, "images/a.png", 8, 6);
+    write_picture(folder, "images/b.png", 8, 6);
+    write_picture(folder, "images\\a.png.png", 8, 6);
+    write_picture(folder, "masks/a.png", 8, 6);
+    write_text(folder, "points/p.ply",
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+               "z\nend_header\n1 2 3\n");
+    write_text(folder, "transforms.json",
+               "{\"fl_x\": 10, \"ply_file_path\": \".\\\\points\\\\p.ply\", \"train_filenames\": "
+               "[\".\\\\images\\\\b.png\", \"images\\\\a.png.png\"], \"frames\": ["
+               "{\"file_path\": \"images\\\\a\", \"mask_path\": \"masks\\\\a.png\", \"transform_matrix\": "
+               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+               "{\"file_path\": \"images\\\\a.png.png\", \"transform_matrix\": "
+               "[[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]},"
+               "{\"file_path\": \".\\\\images\\\\b.png\", \"transform_matrix\": "
+               "[[1,0,0,12],[0,1,0,24],[0,0,1,36],[0,0,0,1]]}]}");
+    static const struct {
+        const char *name;
+        bool is_test, has_mask;
+    } want[] = {
+        {"images/a", true, true}, {"images/b.png", false, false}, {"images\\a.png.png", false, false}};
+    scene s;
+    must(scene_load(folder, NULL, &s, &err));
+    assert_int_equal(s.view_count, 3);
+    assert_int_equal(s.points.count, 1);
+    for (int i = 0; i < 3; i++) {
+        assert_string_equal(s.views[i].name, want[i].name);
+        assert_int_equal(s.views[i].is_test, want[i].is_test);
+        assert_int_equal(s.views[i].mask_path != NULL, want[i].has_mask);
+    }
+    scene_free(&s);
+}
+
 static void photos(void **state)
 {
     const char *folder = *state;
@@ -1117,6 +1154,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(transforms_from_windows, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(alpha_of_an_exr, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masks_of_any_color, make_temporary, remove_temporary),

@@ -12,7 +12,6 @@
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "base/image.h"
 #include "base/image_header.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -27,16 +26,26 @@ static void leave_out(job *j, const char *why)
         log_warn("left out: %s", why);
 }
 
-static gbt_status take_photo(job *j, const char *path, const char *name, gbt_error *err)
+/* What a photo is; GBT_ERR_FORMAT or GBT_ERR_IO when it cannot be used. What the header does not show is seen
+   where EXIF is looked for, in the whole file. */
+static gbt_status look_at(const job *j, const char *path, job_photo *out, gbt_error *err)
 {
     image_header header;
+    GBT_TRY(image_header_read(path, &header, err));
+    if (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: only %d x %d pixels", path, header.width, header.height);
+    *out = (job_photo){.width = header.width, .height = header.height};
+    return j->is_film ? GBT_OK : image_lens_read(path, &out->lens, err);
+}
+
+static gbt_status take_photo(job *j, const char *path, const char *name, gbt_error *err)
+{
+    job_photo photo;
     gbt_error why = {0};
-    if (image_header_read(path, &header, &why) != GBT_OK) {
-        leave_out(j, why.text);
-        return GBT_OK;
-    }
-    if (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS) {
-        base_fail(&why, GBT_ERR_FORMAT, "%s: only %d x %d pixels", path, header.width, header.height);
+    const gbt_status usable = look_at(j, path, &photo, &why);
+    if (usable == GBT_ERR_NO_MEMORY)
+        return base_fail(err, usable, "%s", why.text);
+    if (usable != GBT_OK) {
         leave_out(j, why.text);
         return GBT_OK;
     }
@@ -45,10 +54,10 @@ static gbt_status take_photo(job *j, const char *path, const char *name, gbt_err
                                           sizeof *j->photos, "photos", err);
     j->photos = grown;
     GBT_TRY(status);
-    char *copy = raw_copy_text(name, strlen(name), err);
-    if (copy == NULL)
+    photo.name = raw_copy_text(name, strlen(name), err);
+    if (photo.name == NULL)
         return GBT_ERR_NO_MEMORY;
-    j->photos[j->photo_count++] = (job_photo){.name = copy, .width = header.width, .height = header.height};
+    j->photos[j->photo_count++] = photo;
     return GBT_OK;
 }
 
@@ -109,40 +118,29 @@ gbt_status photos_list(job *j, const char *folder, gbt_error *err)
 
 /* ---- which share a camera ---- */
 
-typedef struct kind {
-    int width, height;
-    image_lens lens;
-} kind;
-
-static bool same_kind(const kind *a, const kind *b)
+static bool same_camera(const job_photo *a, const job_photo *b)
 {
     return a->width == b->width && a->height == b->height && a->lens.focal == b->lens.focal &&
            strcmp(a->lens.camera, b->lens.camera) == 0;
 }
 
-gbt_status photos_group(job *j, gbt_error *err)
+void photos_group(job *j)
 {
-    kind kinds[JOB_GROUPS_MAX];
+    const job_photo *first[JOB_GROUPS_MAX]; /* of each group */
     j->groups = 0;
     for (size_t i = 0; i < j->photo_count; i++) {
         job_photo *photo = &j->photos[i];
-        char path[JOB_PATH_SIZE];
-        kind now = {.width = photo->width, .height = photo->height};
-        GBT_TRY(file_join(path, sizeof path, j->images, photo->name, err));
-        if (!j->is_film)
-            GBT_TRY(image_lens_read(path, &now.lens, err));
         for (photo->group = 0; photo->group < j->groups; photo->group++)
-            if (same_kind(&now, &kinds[photo->group]))
+            if (same_camera(photo, first[photo->group]))
                 break;
         if (photo->group < j->groups)
             continue;
         if (j->groups == JOB_GROUPS_MAX) {
             j->groups++;
-            return GBT_OK;
+            return;
         }
-        kinds[j->groups++] = now;
+        first[j->groups++] = photo;
     }
-    return GBT_OK;
 }
 
 /* ---- links ---- */

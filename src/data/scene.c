@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -104,13 +105,14 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
 }
 
 /* Adds views; points replace what is there. */
-static gbt_status add_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
+static gbt_status add_transforms(const char *path, const char *folder, bool may_be_empty, raw_scene *raw,
+                                 gbt_error *err)
 {
     source_file file;
     unsigned char *owned;
     char *points_name = NULL;
     GBT_TRY(load_file(path, raw, &file, &owned, err));
-    gbt_status status = transforms_read(&file, folder, raw, &points_name, err);
+    gbt_status status = transforms_read(&file, folder, may_be_empty, raw, &points_name, err);
     mem_free(owned);
     if (status == GBT_OK && points_name != NULL && raw->position == NULL) {
         char points_path[PATH_SIZE];
@@ -124,24 +126,53 @@ static gbt_status add_transforms(const char *path, const char *folder, raw_scene
 
 static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
 {
-    GBT_TRY(add_transforms(path, folder, raw, err));
+    GBT_TRY(add_transforms(path, folder, false, raw, err));
     return raw_sort_views(raw, path, err);
+}
+
+/* Photos, and of one photo the view to train on first. */
+static int by_photo(const void *a, const void *b)
+{
+    const raw_view *x = a, *y = b;
+    const int order = strcmp(x->path, y->path);
+    return order != 0 ? order : x->is_test - y->is_test;
+}
+
+/* A photo that is trained on cannot be held out, too. */
+static void drop_repeated(raw_scene *raw, size_t *dropped)
+{
+    size_t kept = 0;
+    qsort(raw->views, raw->view_count, sizeof *raw->views, by_photo);
+    for (size_t i = 0; i < raw->view_count; i++) {
+        const raw_view *last = kept > 0 ? &raw->views[kept - 1] : NULL;
+        if (last != NULL && !last->is_test && raw->views[i].is_test &&
+            strcmp(last->path, raw->views[i].path) == 0)
+            raw_view_free(&raw->views[i]);
+        else
+            raw->views[kept++] = raw->views[i];
+    }
+    *dropped = raw->view_count - kept;
+    raw->view_count = kept;
 }
 
 /* Blender's synthetic scenes: the views to train on in `train`, held-out ones in a file beside it. */
 static gbt_status load_blender(const char *train, const char *folder, raw_scene *raw, gbt_error *err)
 {
     static const char *const held_out[] = {"transforms_test.json", "transforms_val.json"};
-    GBT_TRY(add_transforms(train, folder, raw, err));
+    GBT_TRY(add_transforms(train, folder, false, raw, err));
     for (size_t i = 0; i < sizeof held_out / sizeof held_out[0] && !raw->has_split; i++) {
         char path[PATH_SIZE];
         GBT_TRY(file_join(path, sizeof path, folder, held_out[i], err));
         if (!file_exists(path))
             continue;
         const size_t first = raw->view_count;
-        GBT_TRY(add_transforms(path, folder, raw, err));
+        size_t dropped;
+        GBT_TRY(add_transforms(path, folder, true, raw, err));
         for (size_t v = first; v < raw->view_count; v++)
             raw->views[v].is_test = true;
+        drop_repeated(raw, &dropped);
+        if (dropped > 0)
+            log_warn("%s: photos that are trained on, and so not held out: %zu", path, dropped);
         raw->has_split = raw->view_count > first;
     }
     return raw_sort_views(raw, train, err);

@@ -142,13 +142,13 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
     return status;
 }
 
-static gbt_status read_root(const source_file *file, const json_t *root, const char *folder, raw_scene *out,
-                            char **points_name, gbt_error *err)
+static gbt_status read_root(const source_file *file, const json_t *root, const char *folder,
+                            bool may_be_empty, raw_scene *out, char **points_name, gbt_error *err)
 {
     const json_t *frames = json_object_get(root, "frames");
     if (frames == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no frames (wanted a transforms.json)", file->name);
-    if (!json_is_array(frames) || json_array_size(frames) == 0)
+    if (!json_is_array(frames) || (json_array_size(frames) == 0 && !may_be_empty))
         return base_fail(err, GBT_ERR_FORMAT, "%s: frames is not a list with at least one entry", file->name);
     for (size_t i = 0; i < json_array_size(frames); i++) {
         const transforms_frame s = {
@@ -176,8 +176,8 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
     return *points_name != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-gbt_status transforms_read(const source_file *file, const char *folder, raw_scene *out, char **points_name,
-                           gbt_error *err)
+gbt_status transforms_read(const source_file *file, const char *folder, bool may_be_empty, raw_scene *out,
+                           char **points_name, gbt_error *err)
 {
     *points_name = NULL;
     if (file->size == 0)
@@ -192,7 +192,7 @@ gbt_status transforms_read(const source_file *file, const char *folder, raw_scen
     }
     gbt_status status;
     if (json_is_object(root))
-        status = read_root(file, root, folder, out, points_name, err);
+        status = read_root(file, root, folder, may_be_empty, out, points_name, err);
     else
         status = base_fail(err, GBT_ERR_FORMAT, "%s:1: wanted a JSON object", file->name);
     json_decref(root);

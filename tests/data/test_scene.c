@@ -718,6 +718,61 @@ static void blender_folder(void **state)
     scene_free(&s);
 }
 
+/* A file that holds out nothing is as none; what is trained on is not held out. */
+static void blender_without_a_split(void **state)
+{
+    const char *folder = *state;
+#define VIEW(name, x)                                                                                        \
+    "{\"file_path\": \"" name "\", \"transform_matrix\": [[1,0,0," x "],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}"
+#define BLENDER "{\"camera_angle_x\": 0.7, \"frames\": ["
+    static const struct {
+        const char *test, *val, *says;
+        size_t views;
+        bool has_split;
+        const char *held_out; /* the first by its name */
+    } cases[] = {
+        {BLENDER "]}", NULL, "", 2, false, "train/0"},
+        {BLENDER "]}", BLENDER VIEW("val/0", "5") "]}", "", 3, true, "val/0"},
+        {BLENDER VIEW("train/0", "1") "," VIEW("./train/1", "2") "]}", NULL,
+         "transforms_test.json: photos that are trained on, and so not held out: 2", 2, false, "train/0"},
+        {BLENDER VIEW("train/0.png", "1") "," VIEW("val/0", "2") "]}", BLENDER "]}",
+         "transforms_test.json: photos that are trained on, and so not held out: 1", 3, true, "val/0"},
+    };
+    char text[300];
+    scene s;
+    write_picture(folder, "train/0.png", 8, 6);
+    write_picture(folder, "train/1.png", 8, 6);
+    write_picture(folder, "val/0.png", 8, 6);
+    write_text(folder, "transforms_train.json", BLENDER VIEW("train/0", "1") "," VIEW("train/1", "2") "]}");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_text(folder, "transforms_test.json", cases[i].test);
+        unlink(inside(folder, "transforms_val.json", 0));
+        if (cases[i].val != NULL)
+            write_text(folder, "transforms_val.json", cases[i].val);
+        text[0] = '\0';
+        gbt_listen(keep_text, text);
+        must(scene_load(folder, NULL, &s, &err));
+        gbt_listen(NULL, NULL);
+        assert_int_equal(text[0] != '\0', cases[i].says[0] != '\0');
+        if (strstr(text, cases[i].says) == NULL)
+            fail_msg("%zu: %s", i, text);
+        assert_int_equal(s.view_count, cases[i].views);
+        assert_int_equal(s.has_split, cases[i].has_split);
+        size_t first = 0;
+        while (!s.views[first].is_test)
+            first++;
+        assert_string_equal(s.views[first].name, cases[i].held_out);
+        assert_int_equal(count_tests(&s), 1);
+        scene_free(&s);
+    }
+    write_text(folder, "transforms_train.json", BLENDER "]}");
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "transforms_train.json: frames is not a list with at least one entry"));
+#undef BLENDER
+#undef VIEW
+}
+
 /* nerfstudio's mask_path and train_filenames; instant-ngp's x_fov. */
 static void transforms_masks_and_split(void **state)
 {
@@ -1153,6 +1208,7 @@ int main(void)
                                         remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(blender_without_a_split, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_from_windows, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(alpha_of_an_exr, make_temporary, remove_temporary),

@@ -14,7 +14,7 @@ static gbt_status read_json(const char *text, size_t size, raw_scene *raw, char 
 {
     unsigned char *copy = exact_copy(text, size);
     const source_file file = {"transforms.json", copy, size};
-    const gbt_status status = transforms_read(&file, folder_of_photos, raw, points_name, err);
+    const gbt_status status = transforms_read(&file, folder_of_photos, false, raw, points_name, err);
     free(copy);
     return status;
 }
@@ -407,7 +407,7 @@ static void try_json(const unsigned char *bytes, size_t size, void *context)
     raw_scene raw = {0};
     char *points_name = NULL;
     gbt_error err = {0};
-    const gbt_status status = transforms_read(&file, folder_of_photos, &raw, &points_name, &err);
+    const gbt_status status = transforms_read(&file, folder_of_photos, false, &raw, &points_name, &err);
     check_message(status, &err);
     if (status == GBT_OK) {
         check_raw(&raw);

@@ -26,26 +26,19 @@ static void leave_out(job *j, const char *why)
         log_warn("left out: %s", why);
 }
 
-/* What a photo is; GBT_ERR_FORMAT or GBT_ERR_IO when it cannot be used. What the header does not show is seen
-   where EXIF is looked for, in the whole file. */
-static gbt_status look_at(const job *j, const char *path, job_photo *out, gbt_error *err)
-{
-    image_header header;
-    GBT_TRY(image_header_read(path, &header, err));
-    if (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: only %d x %d pixels", path, header.width, header.height);
-    *out = (job_photo){.width = header.width, .height = header.height};
-    return j->is_film ? GBT_OK : image_lens_read(path, &out->lens, err);
-}
-
+/* What a header does not show of damage is seen where EXIF is looked for, in the whole file. */
 static gbt_status take_photo(job *j, const char *path, const char *name, gbt_error *err)
 {
-    job_photo photo;
+    image_header header;
+    image_lens lens = {0};
     gbt_error why = {0};
-    const gbt_status usable = look_at(j, path, &photo, &why);
-    if (usable == GBT_ERR_NO_MEMORY)
-        return base_fail(err, usable, "%s", why.text);
-    if (usable != GBT_OK) {
+    const bool has_header = image_header_read(path, &header, &why) == GBT_OK;
+    if (has_header && (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS))
+        base_fail(&why, GBT_ERR_FORMAT, "%s: only %d x %d pixels", path, header.width, header.height);
+    else if (has_header && !j->is_film && image_lens_read(path, &lens, &why) != GBT_OK &&
+             why.status != GBT_ERR_FORMAT)
+        return base_fail(err, why.status, "%s", why.text);
+    if (why.status != GBT_OK) {
         leave_out(j, why.text);
         return GBT_OK;
     }
@@ -54,10 +47,11 @@ static gbt_status take_photo(job *j, const char *path, const char *name, gbt_err
                                           sizeof *j->photos, "photos", err);
     j->photos = grown;
     GBT_TRY(status);
-    photo.name = raw_copy_text(name, strlen(name), err);
-    if (photo.name == NULL)
+    char *copy = raw_copy_text(name, strlen(name), err);
+    if (copy == NULL)
         return GBT_ERR_NO_MEMORY;
-    j->photos[j->photo_count++] = photo;
+    j->photos[j->photo_count++] =
+        (job_photo){.name = copy, .width = header.width, .height = header.height, .lens = lens};
     return GBT_OK;
 }
 

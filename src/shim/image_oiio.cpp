@@ -528,7 +528,7 @@ try {
     out->focal = spec.get_float_attribute("Exif:FocalLength", 0.0f);
     return GBT_OK;
 } catch (...) {
-    return caught(path, GBT_ERR_INTERNAL, err);
+    return caught(path, GBT_ERR_FORMAT, err);
 }
 
 extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,

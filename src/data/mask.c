@@ -21,8 +21,22 @@ static void combine(unsigned char *marks, size_t count, unsigned char **valid)
     mem_free(marks);
 }
 
-/* 1 where `channel` has at least `least`. */
-static gbt_status mark_pixels(const image *im, size_t channel, float least, unsigned char **out,
+/* Of a pixel of 3 or 4 channels. */
+typedef float (*pixel_value)(const float *pixel, size_t channels);
+
+static float opacity(const float *pixel, size_t channels)
+{
+    return channels < 4 ? 1 : fminf(fmaxf(pixel[3], 0), 1);
+}
+
+/* Masks come in any colour, and as cut-outs. */
+static float brightness(const float *pixel, size_t channels)
+{
+    return fmaxf(pixel[0], fmaxf(pixel[1], pixel[2])) * opacity(pixel, channels);
+}
+
+/* 1 where `value` is at least `least`. */
+static gbt_status mark_pixels(const image *im, pixel_value value, float least, unsigned char **out,
                               gbt_error *err)
 {
     const size_t count = (size_t)im->width * (size_t)im->height, channels = (size_t)im->channels;
@@ -30,15 +44,16 @@ static gbt_status mark_pixels(const image *im, size_t channel, float least, unsi
     if (*out == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
-        (*out)[i] = im->pixels[i * channels + channel] >= least;
+        (*out)[i] = value(im->pixels + i * channels, channels) >= least;
     return GBT_OK;
 }
 
 static float half_of_largest(const image *im)
 {
+    const size_t channels = (size_t)im->channels;
     float largest = 0;
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
-        largest = fmaxf(largest, im->pixels[i * (size_t)im->channels]);
+        largest = fmaxf(largest, brightness(im->pixels + i * channels, channels));
     return largest > 0 ? 0.5f * largest : 1; /* a black mask leaves nothing */
 }
 
@@ -53,7 +68,7 @@ static gbt_status read_marks(const char *path, const image *photo, unsigned char
                       "%s: mask does not have the photo's aspect (wanted %d x %d or a multiple, got %d x %d)",
                       path, photo->width, photo->height, mask.width, mask.height);
     if (status == GBT_OK)
-        status = mark_pixels(&mask, 0, half_of_largest(&mask), out, err);
+        status = mark_pixels(&mask, brightness, half_of_largest(&mask), out, err);
     if (status == GBT_OK && (mask.width != photo->width || mask.height != photo->height)) {
         unsigned char *stored = *out;
         status = photo_resize_valid(stored, mask.width, mask.height, photo->width, photo->height, out, err);
@@ -68,7 +83,7 @@ gbt_status mask_apply(const scene_view *view, const image *stored, unsigned char
     const size_t count = (size_t)stored->width * (size_t)stored->height;
     unsigned char *marks = NULL;
     if (view->alpha == SCENE_ALPHA_MASK && stored->channels == 4) {
-        GBT_TRY(mark_pixels(stored, 3, 0.5f, &marks, err));
+        GBT_TRY(mark_pixels(stored, opacity, 0.5f, &marks, err));
         combine(marks, count, valid);
     }
     if (view->mask_path == NULL)

@@ -10,9 +10,10 @@
  * Take pixels out of `valid` by the view's mask picture and, with SCENE_ALPHA_MASK, by the photo's alpha
  * channel.
  *
- * A pixel of the mask counts when it has at least half the mask's largest value, so that masks of 0 and 1 do
- * as well as those of 0 and 255, and lossy ones. A mask of another size must have the photo's aspect within 1
- * px; a pixel that touches a dark one of the mask is out.
+ * The value of a mask's pixel is the largest of its colours, times its opacity. It counts when it has at
+ * least half the mask's largest value, so that masks of 0 and 1 do as well as those of 0 and 255, and lossy
+ * ones. A mask of another size must have the photo's aspect within 1 px; a pixel that touches a dark one of
+ * the mask is out.
  *
  * @param stored [in]     the photo as the file has it
  * @param valid  [in,out] NULL (all count) or [height][width] of it; made when something is left out; the

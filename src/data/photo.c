@@ -5,23 +5,42 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 #include "data/mask.h"
 #include "data/photo_size.h"
 #include "data/scene.h"
 
-/* Four channels to three. image_read() gives finite values, and alpha in [0, 1] keeps them so. */
-static gbt_status to_rgb(const image *in, scene_alpha kind, image *out, gbt_error *err)
+/* Four channels to three; `premultiplied`: the colours are times alpha already. image_read() gives finite
+   values, and alpha in [0, 1] keeps them so; where it is a mask, they are divided by no less than a half,
+   for what is below does not count. */
+static gbt_status to_rgb(const image *in, scene_alpha kind, bool premultiplied, image *out, gbt_error *err)
 {
     const float behind = kind == SCENE_ALPHA_WHITE;
+    const bool is_mask = kind == SCENE_ALPHA_MASK;
     GBT_TRY(image_alloc(out, in->width, in->height, 3, err));
     const size_t count = (size_t)in->width * (size_t)in->height, channels = (size_t)in->channels;
     for (size_t i = 0; i < count; i++) {
         const float *pixel = in->pixels + i * channels;
-        const float alpha = channels < 4 || kind == SCENE_ALPHA_MASK ? 1 : fminf(fmaxf(pixel[3], 0), 1);
+        const float opacity = channels < 4 ? 1 : fminf(fmaxf(pixel[3], 0), 1);
+        const float alpha = is_mask ? 1 : opacity;
+        const float scale = !premultiplied ? alpha : is_mask && opacity >= 0.5f ? 1 / opacity : 1;
         for (size_t c = 0; c < 3; c++)
-            out->pixels[3 * i + c] = pixel[c] * alpha + behind * (1 - alpha);
+            out->pixels[3 * i + c] = pixel[c] * scale + behind * (1 - alpha);
     }
+    return GBT_OK;
+}
+
+/* EXR says that colours are multiplied by alpha, PNG that they are not, and image_read() leaves both as they
+   are. */
+static gbt_status is_premultiplied(const char *path, const image *stored, bool *out, gbt_error *err)
+{
+    image_header header;
+    *out = false;
+    if (stored->channels < 4)
+        return GBT_OK;
+    GBT_TRY(image_header_read(path, &header, err));
+    *out = header.kind == IMAGE_EXR;
     return GBT_OK;
 }
 
@@ -48,9 +67,12 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
     if (width < 1 || height < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: photo wanted at %d x %d (wanted both >= 1)", view->path,
                          width, height);
+    bool premultiplied = false;
     gbt_status status = read_stored(view, &stored, valid, err);
     if (status == GBT_OK)
-        status = to_rgb(&stored, view->alpha, &rgb, err);
+        status = is_premultiplied(view->path, &stored, &premultiplied, err);
+    if (status == GBT_OK)
+        status = to_rgb(&stored, view->alpha, premultiplied, &rgb, err);
     image_free(&stored);
     if (status == GBT_OK && rgb.width == width && rgb.height == height) {
         *out = rgb;

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "base/fail.h"
 #include "base/image_header.h"
 #include "base/log.h"
 #include "data/photo_size.h"
@@ -27,14 +28,32 @@ static void add_problem(photo_check *c, const char *format, ...)
     c->problem_count++;
 }
 
+/* What training would refuse, for this reason. */
+static void refuse(photo_check *c, size_t *kind, const gbt_error *why)
+{
+    (*kind)++;
+    add_problem(c, "%.350s", why->text);
+    base_fail(&c->refused, why->status, "%s", why->text);
+}
+
+static bool read_header(photo_check *c, const char *path, image_header *out)
+{
+    gbt_error why = {0};
+    if (image_header_read(path, out, &why) == GBT_OK)
+        return true;
+    refuse(c, &c->unreadable, &why);
+    return false;
+}
+
 static void compare_with_camera(photo_check *c, const scene_view *view, const image_header *h)
 {
     const gbt_camera *camera = &view->camera;
     if (!photo_same_aspect(h->width, h->height, camera->width, camera->height)) {
-        c->other_shape++;
-        add_problem(c, "%.250s: %d x %d is not the shape of its camera, %d x %d%s", view->path, h->width,
-                    h->height, camera->width, camera->height,
-                    h->orientation > 4 ? " (it has an EXIF rotation, which is not applied)" : "");
+        gbt_error why = {0};
+        base_fail(&why, GBT_ERR_FORMAT, "%.250s: %d x %d is not the shape of its camera, %d x %d%s",
+                  view->path, h->width, h->height, camera->width, camera->height,
+                  h->orientation > 4 ? " (it has an EXIF rotation, which is not applied)" : "");
+        refuse(c, &c->other_shape, &why);
         return;
     }
     c->other_size += h->width != camera->width || h->height != camera->height;
@@ -49,28 +68,35 @@ static void compare_with_camera(photo_check *c, const scene_view *view, const im
     }
 }
 
+static void compare_with_photo(photo_check *c, const char *mask_path, const image_header *mask,
+                               const image_header *photo)
+{
+    gbt_error why = {0};
+    if (photo_same_aspect(mask->width, mask->height, photo->width, photo->height))
+        return;
+    base_fail(&why, GBT_ERR_FORMAT, "%.250s: %d x %d is not the shape of its photo, %d x %d", mask_path,
+              mask->width, mask->height, photo->width, photo->height);
+    refuse(c, &c->other_shape, &why);
+}
+
 static void check_view(photo_check *c, const scene_view *view)
 {
     image_header h, mask;
-    gbt_error err = {0};
-    c->with_mask += view->mask_path != NULL;
-    if (view->mask_path != NULL && image_header_read(view->mask_path, &mask, &err) != GBT_OK) {
-        c->unreadable++;
-        add_problem(c, "%.350s", err.text);
+    const bool has_photo = read_header(c, view->path, &h);
+    if (has_photo) {
+        const bool is_first = c->found++ == 0;
+        c->with_alpha += h.has_alpha;
+        c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
+        c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
+        c->max_width = h.width > c->max_width ? h.width : c->max_width;
+        c->max_height = h.height > c->max_height ? h.height : c->max_height;
+        compare_with_camera(c, view, &h);
     }
-    err = (gbt_error){0};
-    if (image_header_read(view->path, &h, &err) != GBT_OK) {
-        c->unreadable++;
-        add_problem(c, "%.350s", err.text);
+    if (view->mask_path == NULL)
         return;
-    }
-    const bool is_first = c->found++ == 0;
-    c->with_alpha += h.has_alpha;
-    c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
-    c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
-    c->max_width = h.width > c->max_width ? h.width : c->max_width;
-    c->max_height = h.height > c->max_height ? h.height : c->max_height;
-    compare_with_camera(c, view, &h);
+    c->with_mask++;
+    if (read_header(c, view->mask_path, &mask) && has_photo)
+        compare_with_photo(c, view->mask_path, &mask, &h);
 }
 
 void photo_check_all(const scene *s, photo_check *out)

@@ -10,7 +10,8 @@ enum { PHOTO_CHECK_SHOWN = 5, PHOTO_CHECK_TEXT = 400 };
 typedef struct photo_check {
     size_t found;       /* readable, by their headers */
     size_t unreadable;  /* photos or masks that training would refuse, by their headers */
-    size_t other_shape; /* readable, but not the camera's shape: training would refuse them too */
+    size_t other_shape; /* readable, but not the camera's shape, or a mask not the photo's: training would
+                           refuse them too */
     size_t other_size;  /* of the camera's shape, but another size */
     size_t tiny;        /* so small beside the camera's size that hardly anything is on them */
     size_t turned;      /* with an EXIF rotation, which is not applied */
@@ -18,13 +19,13 @@ typedef struct photo_check {
     int min_width, min_height, max_width, max_height;  /* of those found */
     char problem[PHOTO_CHECK_SHOWN][PHOTO_CHECK_TEXT]; /* the first of all these, a line each */
     size_t problem_count;                              /* all of them; more than are shown, perhaps */
+    gbt_error refused; /* the first reason for which training would refuse one; status GBT_OK: none */
 } photo_check;
 
 /** Cost: a few reads per photo. */
 void photo_check_all(const scene *s, photo_check *out);
 
-/** A warning, each in one line, for photos that are turned and for tiny ones; those that training refuses are
-   named where they are read. */
+/** A warning, each in one line, for photos that are turned and for tiny ones. */
 void photo_check_warn(const photo_check *check, const char *data);
 
 #endif

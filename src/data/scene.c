@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -17,6 +18,7 @@
 #include "base/paged.h"
 #include "base/vec.h"
 #include "data/colmap_bin.h"
+#include "data/colmap_place.h"
 #include "data/colmap_txt.h"
 #include "data/ply.h"
 #include "data/scene_photos.h"
@@ -36,41 +38,6 @@ static gbt_status load_file(const char *path, raw_scene *raw, source_file *out, 
     return status;
 }
 
-/* Which of the three files of a COLMAP model with this ending are there. */
-static gbt_status count_model_files(const char *folder, const char *ending, int *count, gbt_error *err)
-{
-    static const char *const names[3] = {"cameras", "images", "points3D"};
-    *count = 0;
-    for (int i = 0; i < 3; i++) {
-        char name[32], path[PATH_SIZE];
-        snprintf(name, sizeof name, "%s.%s", names[i], ending);
-        GBT_TRY(file_join(path, sizeof path, folder, name, err));
-        *count += file_exists(path);
-    }
-    return GBT_OK;
-}
-
-/* The folder that holds a COLMAP model, complete or not; `model` is empty when there is none. */
-static gbt_status find_colmap(const char *folder, char model[PATH_SIZE], const char **ending, gbt_error *err)
-{
-    static const char *const places[] = {"sparse/0", "sparse", "."};
-    for (size_t i = 0; i < sizeof places / sizeof places[0]; i++) {
-        int binary, text;
-        if (strcmp(places[i], ".") == 0)
-            GBT_TRY(file_join(model, PATH_SIZE, folder, "", err));
-        else
-            GBT_TRY(file_join(model, PATH_SIZE, folder, places[i], err));
-        GBT_TRY(count_model_files(model, "bin", &binary, err));
-        GBT_TRY(count_model_files(model, "txt", &text, err));
-        /* A complete set wins over an incomplete one, then binary over text. */
-        *ending = binary == 3 || (text != 3 && binary > 0) ? "bin" : "txt";
-        if (binary > 0 || text == 3 || (text > 0 && i + 1 < sizeof places / sizeof places[0]))
-            return GBT_OK;
-    }
-    model[0] = '\0';
-    return GBT_OK;
-}
-
 /* COLMAP 4 has poses of rigs beside those of images, which are composed of them already. */
 static void say_rigs(const char *model, const char *ending)
 {
@@ -80,7 +47,7 @@ static void say_rigs(const char *model, const char *ending)
         log_info("%s: not needed: every image has its whole pose", path);
 }
 
-static gbt_status load_colmap(const char *model, const char *ending, raw_scene *raw, gbt_error *err)
+static gbt_status read_model(const char *model, const char *ending, raw_scene *raw, gbt_error *err)
 {
     static const char *const names[3] = {"cameras", "images", "points3D"};
     char paths[3][PATH_SIZE];
@@ -112,6 +79,21 @@ static gbt_status load_colmap(const char *model, const char *ending, raw_scene *
     return status;
 }
 
+/* The model that is in `folder`, if there is one. */
+static gbt_status load_colmap(const char *folder, bool of_nerfstudio, raw_scene *raw, const char **source,
+                              bool *found, gbt_error *err)
+{
+    char model[PATH_SIZE];
+    const char *ending;
+    GBT_TRY(colmap_place_find(folder, of_nerfstudio, model, sizeof model, &ending, err));
+    *found = model[0] != '\0';
+    if (!*found)
+        return GBT_OK;
+    *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
+    GBT_TRY(read_model(model, ending, raw, err));
+    return scene_find_photos(folder, raw, err);
+}
+
 static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
 {
     source_file file;
@@ -123,13 +105,14 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
 }
 
 /* Adds views; points replace what is there. */
-static gbt_status add_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
+static gbt_status add_transforms(const char *path, const char *folder, bool may_be_empty, raw_scene *raw,
+                                 gbt_error *err)
 {
     source_file file;
     unsigned char *owned;
     char *points_name = NULL;
     GBT_TRY(load_file(path, raw, &file, &owned, err));
-    gbt_status status = transforms_read(&file, folder, raw, &points_name, err);
+    gbt_status status = transforms_read(&file, folder, may_be_empty, raw, &points_name, err);
     mem_free(owned);
     if (status == GBT_OK && points_name != NULL && raw->position == NULL) {
         char points_path[PATH_SIZE];
@@ -143,24 +126,53 @@ static gbt_status add_transforms(const char *path, const char *folder, raw_scene
 
 static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
 {
-    GBT_TRY(add_transforms(path, folder, raw, err));
+    GBT_TRY(add_transforms(path, folder, false, raw, err));
     return raw_sort_views(raw, path, err);
+}
+
+/* Photos, and of one photo the view to train on first. */
+static int by_photo(const void *a, const void *b)
+{
+    const raw_view *x = a, *y = b;
+    const int order = strcmp(x->path, y->path);
+    return order != 0 ? order : x->is_test - y->is_test;
+}
+
+/* A photo that is trained on cannot be held out, too. */
+static void drop_repeated(raw_scene *raw, size_t *dropped)
+{
+    size_t kept = 0;
+    qsort(raw->views, raw->view_count, sizeof *raw->views, by_photo);
+    for (size_t i = 0; i < raw->view_count; i++) {
+        const raw_view *last = kept > 0 ? &raw->views[kept - 1] : NULL;
+        if (last != NULL && !last->is_test && raw->views[i].is_test &&
+            strcmp(last->path, raw->views[i].path) == 0)
+            raw_view_free(&raw->views[i]);
+        else
+            raw->views[kept++] = raw->views[i];
+    }
+    *dropped = raw->view_count - kept;
+    raw->view_count = kept;
 }
 
 /* Blender's synthetic scenes: the views to train on in `train`, held-out ones in a file beside it. */
 static gbt_status load_blender(const char *train, const char *folder, raw_scene *raw, gbt_error *err)
 {
     static const char *const held_out[] = {"transforms_test.json", "transforms_val.json"};
-    GBT_TRY(add_transforms(train, folder, raw, err));
+    GBT_TRY(add_transforms(train, folder, false, raw, err));
     for (size_t i = 0; i < sizeof held_out / sizeof held_out[0] && !raw->has_split; i++) {
         char path[PATH_SIZE];
         GBT_TRY(file_join(path, sizeof path, folder, held_out[i], err));
         if (!file_exists(path))
             continue;
         const size_t first = raw->view_count;
-        GBT_TRY(add_transforms(path, folder, raw, err));
+        size_t dropped;
+        GBT_TRY(add_transforms(path, folder, true, raw, err));
         for (size_t v = first; v < raw->view_count; v++)
             raw->views[v].is_test = true;
+        drop_repeated(raw, &dropped);
+        if (dropped > 0)
+            log_warn("%s: photos that are trained on, and so not held out: %zu", path, dropped);
         raw->has_split = raw->view_count > first;
     }
     return raw_sort_views(raw, train, err);
@@ -172,15 +184,10 @@ static bool ends_with(const char *text, const char *ending)
     return length >= ending_length && strcasecmp(text + length - ending_length, ending) == 0;
 }
 
-static gbt_status load_raw(const char *path, raw_scene *raw, const char **source, gbt_error *err)
+static gbt_status load_file_source(const char *path, raw_scene *raw, const char **source, gbt_error *err)
 {
-    char place[PATH_SIZE];
-    const char *ending;
-    file_kind kind;
-    GBT_TRY(file_look(path, &kind, err));
-    if (kind == FILE_NONE)
-        return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
-    if (kind == FILE_OTHER && ends_with(path, ".ply")) {
+    char folder[PATH_SIZE];
+    if (ends_with(path, ".ply")) {
         *source = "ply";
         GBT_TRY(load_points(path, raw, err));
         if (raw->point_count == 0)
@@ -188,41 +195,56 @@ static gbt_status load_raw(const char *path, raw_scene *raw, const char **source
                              raw->points_dropped);
         return GBT_OK;
     }
-    if (kind == FILE_OTHER && ends_with(path, ".json")) {
+    if (ends_with(path, ".json")) {
         *source = "transforms";
         const char *slash = strrchr(path, '/');
-        if (slash != NULL && (size_t)(slash - path) >= sizeof place)
+        if (slash != NULL && (size_t)(slash - path) >= sizeof folder)
             return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-        snprintf(place, sizeof place, "%.*s", slash == NULL ? 1 : (int)(slash - path) + (slash == path),
+        snprintf(folder, sizeof folder, "%.*s", slash == NULL ? 1 : (int)(slash - path) + (slash == path),
                  slash == NULL ? "." : path);
-        return load_transforms(path, place, raw, err);
+        return load_transforms(path, folder, raw, err);
     }
-    if (kind == FILE_OTHER) {
-        GBT_TRY(unposed_check(path, err));
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: not a data set (wanted a folder, a .ply or a transforms.json)", path);
-    }
-    GBT_TRY(find_colmap(path, place, &ending, err));
-    if (place[0] != '\0') {
-        *source = strcmp(ending, "bin") == 0 ? "colmap-bin" : "colmap-txt";
-        GBT_TRY(load_colmap(place, ending, raw, err));
-        return scene_find_photos(path, raw, err);
-    }
+    GBT_TRY(unposed_check(path, err));
+    return base_fail(err, GBT_ERR_FORMAT, "%s: not a data set (wanted a folder, a .ply or a transforms.json)",
+                     path);
+}
+
+static gbt_status load_folder(const char *path, raw_scene *raw, const char **source, gbt_error *err)
+{
+    char place[PATH_SIZE];
+    bool found;
+    GBT_TRY(load_colmap(path, false, raw, source, &found, err));
+    if (found)
+        return GBT_OK;
     GBT_TRY(file_join(place, sizeof place, path, "transforms.json", err));
     if (file_exists(place)) {
         *source = "transforms";
         return load_transforms(place, path, raw, err);
     }
     GBT_TRY(file_join(place, sizeof place, path, "transforms_train.json", err));
-    if (!file_exists(place)) {
-        GBT_TRY(unposed_check(path, err));
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or "
-                         "transforms_train.json in it)",
-                         path);
+    if (file_exists(place)) {
+        *source = "blender";
+        return load_blender(place, path, raw, err);
     }
-    *source = "blender";
-    return load_blender(place, path, raw, err);
+    GBT_TRY(load_colmap(path, true, raw, source, &found, err));
+    if (found)
+        return GBT_OK;
+    GBT_TRY(colmap_place_check(path, err));
+    GBT_TRY(unposed_check(path, err));
+    return base_fail(err, GBT_ERR_FORMAT,
+                     "%s: not a data set (wanted sparse/0/cameras.bin, transforms.json or "
+                     "transforms_train.json in it)",
+                     path);
+}
+
+static gbt_status load_raw(const char *path, raw_scene *raw, const char **source, gbt_error *err)
+{
+    file_kind kind;
+    GBT_TRY(file_look(path, &kind, err));
+    if (kind == FILE_NONE)
+        return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
+    return kind == FILE_OTHER ? load_file_source(path, raw, source, err)
+                              : load_folder(path, raw, source, err);
 }
 
 static uint64_t ordered_bits(double value)

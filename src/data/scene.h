@@ -92,9 +92,9 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
  *
  * A folder is COLMAP (sparse/0, sparse or the folder itself; binary preferred; images/ and perhaps masks/
  * beside it), or holds a transforms.json, or a transforms_train.json with its own held-out views in
- * transforms_test.json (or _val). Views without a photo are left out, counted and named in a warning; all of
- * them: GBT_ERR_IO. Photos are not read here (scene_read_photo). The origin is the median of the points (of
- * the camera centres without points), so outliers cannot move it.
+ * transforms_test.json (or _val), or is COLMAP's in colmap/sparse/0. Views without a photo are left out,
+ * counted and named in a warning; all of them: GBT_ERR_IO. Photos are not read here (scene_read_photo). The
+ * origin is the median of the points (of the camera centres without points), so outliers cannot move it.
  *
  * @param split [in] NULL: SCENE_SPLIT_AUTO
  * @param out [out] free with scene_free(); zeroed on failure

@@ -2,35 +2,67 @@
 /* data/transforms.c -- transforms.json from bytes: its frames, their photos and masks, the split. */
 #include "data/transforms.h"
 
+#include <stdio.h>
+
 #include "base/file.h"
 #include "data/transforms_camera.h"
 
-enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
+enum { NAME_SIZE = RAW_NAME_LIMIT + 1, PATH_SIZE = RAW_NAME_LIMIT + 4096, ENDING_SIZE = 8 };
 
 /* A leading ./ says nothing. */
-static const char *plain_name(const json_t *text)
+static const char *plain_name(const char *name)
 {
-    const char *name = json_string_value(text);
     while (strncmp(name, "./", 2) == 0)
-        name += 2;
+        name += 2 + strspn(name + 2, "/");
     return name;
 }
 
-/* The photo of a frame: the name as it is, then with .png and .jpg. False when none is there. */
-static gbt_status find_photo(const char *folder, const char *name, char path[PATH_SIZE], bool *found,
-                             gbt_error *err)
+/* The same name as it is here, if Windows wrote it. */
+static const char *with_slashes(const char *name, char out[NAME_SIZE])
 {
-    static const char *const endings[] = {"", ".png", ".jpg"};
+    snprintf(out, NAME_SIZE, "%s", name);
+    for (char *c = out; *c != '\0'; c++)
+        *c = *c == '\\' ? '/' : *c;
+    return plain_name(out);
+}
+
+/* The file of a name, with one of some endings. */
+static gbt_status find_file(const char *folder, const char *name, const char *const *endings,
+                            char path[PATH_SIZE], bool *found, gbt_error *err)
+{
     file_kind kind;
     *found = false;
-    for (size_t i = 0; i < sizeof endings / sizeof endings[0] && !*found; i++) {
-        GBT_TRY(file_join(path, PATH_SIZE - 8, folder, name, err));
-        memcpy(path + strlen(path), endings[i], strlen(endings[i]) + 1); /* the 8 bytes left out above */
+    for (; *endings != NULL && !*found; endings++) {
+        GBT_TRY(file_join(path, PATH_SIZE - ENDING_SIZE, folder, name, err));
+        strcat(path, *endings); /* the bytes left out above */
         GBT_TRY(file_look(path, &kind, err));
         *found = kind == FILE_OTHER;
     }
     return GBT_OK;
 }
+
+/* The file that is `written`, or else the same with slashes for backslashes: here these are a letter like any
+   other. `name` is as it was found; `path` is of the last that was tried. */
+static gbt_status find_named(raw_place place, const char *folder, const char *written,
+                             const char *const *endings, char name[NAME_SIZE], char path[PATH_SIZE],
+                             bool *found, gbt_error *err)
+{
+    char other[NAME_SIZE];
+    written = plain_name(written);
+    GBT_TRY(raw_check_name(written, strlen(written), place, err));
+    memcpy(name, written, strlen(written) + 1);
+    GBT_TRY(find_file(folder, name, endings, path, found, err));
+    if (*found || strchr(name, '\\') == NULL)
+        return GBT_OK;
+    const char *slashed = with_slashes(name, other);
+    GBT_TRY(raw_check_name(slashed, strlen(slashed), place, err));
+    GBT_TRY(find_file(folder, slashed, endings, path, found, err));
+    if (*found)
+        memcpy(name, slashed, strlen(slashed) + 1);
+    return GBT_OK;
+}
+
+static const char *const as_it_is[] = {"", NULL}, *const photo_endings[] = {"", ".png", ".jpg", NULL};
 
 /* The frame's mask, or NULL when it names none. */
 static gbt_status find_mask(const transforms_frame *s, const char *folder, char **out, gbt_error *err)
@@ -41,14 +73,11 @@ static gbt_status find_mask(const transforms_frame *s, const char *folder, char 
         return GBT_OK;
     if (!json_is_string(value))
         return transforms_fail(s, err, "wanted a string", "mask_path");
-    const char *name = json_string_value(value);
-    char path[PATH_SIZE];
-    file_kind kind;
-    GBT_TRY(
-        raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
-    GBT_TRY(file_join(path, sizeof path, folder, name, err));
-    GBT_TRY(file_look(path, &kind, err));
-    if (kind != FILE_OTHER)
+    char name[NAME_SIZE], path[PATH_SIZE];
+    bool found;
+    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, folder,
+                       json_string_value(value), as_it_is, name, path, &found, err));
+    if (!found)
         return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name,
                          s->frame_index, path);
     *out = raw_copy_text(path, strlen(path), err);
@@ -60,14 +89,12 @@ static gbt_status read_frame(const transforms_frame *s, const char *folder, raw_
     const json_t *value = json_object_get(s->frame, "file_path");
     if (!json_is_string(value))
         return transforms_fail(s, err, "wanted a string", "file_path");
-    const char *name = plain_name(value);
-    GBT_TRY(
-        raw_check_name(name, strlen(name), (raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, err));
-    char path[PATH_SIZE];
+    char name[NAME_SIZE], path[PATH_SIZE];
     bool found;
     gbt_camera camera = {0};
     GBT_TRY(transforms_pose(s, &camera, err));
-    GBT_TRY(find_photo(folder, name, path, &found, err));
+    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, folder,
+                       json_string_value(value), photo_endings, name, path, &found, err));
     if (!found) {
         raw_count_missing(out, name);
         return GBT_OK;
@@ -99,11 +126,13 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
                                             : base_fail(err, GBT_ERR_FORMAT,
                                                         "%s: train_filenames: wanted a list", file->name);
     for (size_t i = 0; i < json_array_size(list) && status == GBT_OK; i++) {
-        const json_t *name = json_array_get(list, i);
-        if (!json_is_string(name))
+        const char *name = json_string_value(json_array_get(list, i));
+        char slashed[NAME_SIZE];
+        if (name == NULL)
             status = base_fail(err, GBT_ERR_FORMAT, "%s: train_filenames: entry %zu is not a string",
                                file->name, i);
-        else if (json_object_set_new(names, plain_name(name), json_true()) != 0)
+        else if (json_object_set_new(names, plain_name(name), json_true()) != 0 ||
+                 json_object_set_new(names, with_slashes(name, slashed), json_true()) != 0)
             status = base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the names", file->name);
     }
     for (size_t i = 0; i < out->view_count && status == GBT_OK; i++)
@@ -113,13 +142,13 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
     return status;
 }
 
-static gbt_status read_root(const source_file *file, const json_t *root, const char *folder, raw_scene *out,
-                            char **points_name, gbt_error *err)
+static gbt_status read_root(const source_file *file, const json_t *root, const char *folder,
+                            bool may_be_empty, raw_scene *out, char **points_name, gbt_error *err)
 {
     const json_t *frames = json_object_get(root, "frames");
     if (frames == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no frames (wanted a transforms.json)", file->name);
-    if (!json_is_array(frames) || json_array_size(frames) == 0)
+    if (!json_is_array(frames) || (json_array_size(frames) == 0 && !may_be_empty))
         return base_fail(err, GBT_ERR_FORMAT, "%s: frames is not a list with at least one entry", file->name);
     for (size_t i = 0; i < json_array_size(frames); i++) {
         const transforms_frame s = {
@@ -139,20 +168,25 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
         return GBT_OK;
     if (!json_is_string(points))
         return base_fail(err, GBT_ERR_FORMAT, "%s: ply_file_path: wanted a string", file->name);
-    const char *name = json_string_value(points);
-    GBT_TRY(raw_check_name(name, strlen(name), (raw_place){file->name, ':', 1}, err));
+    char name[NAME_SIZE], path[PATH_SIZE];
+    bool found;
+    GBT_TRY(find_named((raw_place){file->name, ':', 1}, folder, json_string_value(points), as_it_is, name,
+                       path, &found, err));
     *points_name = raw_copy_text(name, strlen(name), err);
     return *points_name != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-gbt_status transforms_read(const source_file *file, const char *folder, raw_scene *out, char **points_name,
-                           gbt_error *err)
+gbt_status transforms_read(const source_file *file, const char *folder, bool may_be_empty, raw_scene *out,
+                           char **points_name, gbt_error *err)
 {
     *points_name = NULL;
     if (file->size == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s:1: file is empty (wanted JSON)", file->name);
     json_error_t fault;
-    json_t *root = json_loadb((const char *)file->bytes, file->size, JSON_REJECT_DUPLICATES, &fault);
+    const bool has_mark = file->size >= 3 && memcmp(file->bytes, "\xef\xbb\xbf", 3) == 0; /* of UTF-8 */
+    const size_t first = has_mark ? 3 : 0;
+    json_t *root =
+        json_loadb((const char *)file->bytes + first, file->size - first, JSON_REJECT_DUPLICATES, &fault);
     if (root == NULL) {
         if (json_error_code(&fault) == json_error_out_of_memory)
             return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", file->name);
@@ -161,7 +195,7 @@ gbt_status transforms_read(const source_file *file, const char *folder, raw_scen
     }
     gbt_status status;
     if (json_is_object(root))
-        status = read_root(file, root, folder, out, points_name, err);
+        status = read_root(file, root, folder, may_be_empty, out, points_name, err);
     else
         status = base_fail(err, GBT_ERR_FORMAT, "%s:1: wanted a JSON object", file->name);
     json_decref(root);

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "base/image.h"
 #include "gbtrace/pose.h"
 
 enum { JOB_PATH_SIZE = 4096, JOB_GROUPS_MAX = 8 };
@@ -13,7 +14,8 @@ enum { JOB_PATH_SIZE = 4096, JOB_GROUPS_MAX = 8 };
 typedef struct job_photo {
     char *name; /* below the folder of photos; owned */
     int width, height;
-    int group; /* of photos that share a camera, by size and EXIF; from 0 */
+    image_lens lens; /* {0} in a film */
+    int group;       /* of photos that share a camera, by size and EXIF; from 0 */
 } job_photo;
 
 typedef struct job {

@@ -12,7 +12,6 @@
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "base/image.h"
 #include "base/image_header.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -27,16 +26,19 @@ static void leave_out(job *j, const char *why)
         log_warn("left out: %s", why);
 }
 
+/* What a header does not show of damage is seen where EXIF is looked for, in the whole file. */
 static gbt_status take_photo(job *j, const char *path, const char *name, gbt_error *err)
 {
     image_header header;
+    image_lens lens = {0};
     gbt_error why = {0};
-    if (image_header_read(path, &header, &why) != GBT_OK) {
-        leave_out(j, why.text);
-        return GBT_OK;
-    }
-    if (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS) {
+    const bool has_header = image_header_read(path, &header, &why) == GBT_OK;
+    if (has_header && (header.width < LEAST_PIXELS || header.height < LEAST_PIXELS))
         base_fail(&why, GBT_ERR_FORMAT, "%s: only %d x %d pixels", path, header.width, header.height);
+    else if (has_header && !j->is_film && image_lens_read(path, &lens, &why) != GBT_OK &&
+             why.status != GBT_ERR_FORMAT)
+        return base_fail(err, why.status, "%s", why.text);
+    if (why.status != GBT_OK) {
         leave_out(j, why.text);
         return GBT_OK;
     }
@@ -48,7 +50,8 @@ static gbt_status take_photo(job *j, const char *path, const char *name, gbt_err
     char *copy = raw_copy_text(name, strlen(name), err);
     if (copy == NULL)
         return GBT_ERR_NO_MEMORY;
-    j->photos[j->photo_count++] = (job_photo){.name = copy, .width = header.width, .height = header.height};
+    j->photos[j->photo_count++] =
+        (job_photo){.name = copy, .width = header.width, .height = header.height, .lens = lens};
     return GBT_OK;
 }
 
@@ -109,40 +112,29 @@ gbt_status photos_list(job *j, const char *folder, gbt_error *err)
 
 /* ---- which share a camera ---- */
 
-typedef struct kind {
-    int width, height;
-    image_lens lens;
-} kind;
-
-static bool same_kind(const kind *a, const kind *b)
+static bool same_camera(const job_photo *a, const job_photo *b)
 {
     return a->width == b->width && a->height == b->height && a->lens.focal == b->lens.focal &&
            strcmp(a->lens.camera, b->lens.camera) == 0;
 }
 
-gbt_status photos_group(job *j, gbt_error *err)
+void photos_group(job *j)
 {
-    kind kinds[JOB_GROUPS_MAX];
+    const job_photo *first[JOB_GROUPS_MAX]; /* of each group */
     j->groups = 0;
     for (size_t i = 0; i < j->photo_count; i++) {
         job_photo *photo = &j->photos[i];
-        char path[JOB_PATH_SIZE];
-        kind now = {.width = photo->width, .height = photo->height};
-        GBT_TRY(file_join(path, sizeof path, j->images, photo->name, err));
-        if (!j->is_film)
-            GBT_TRY(image_lens_read(path, &now.lens, err));
         for (photo->group = 0; photo->group < j->groups; photo->group++)
-            if (same_kind(&now, &kinds[photo->group]))
+            if (same_camera(photo, first[photo->group]))
                 break;
         if (photo->group < j->groups)
             continue;
         if (j->groups == JOB_GROUPS_MAX) {
             j->groups++;
-            return GBT_OK;
+            return;
         }
-        kinds[j->groups++] = now;
+        first[j->groups++] = photo;
     }
-    return GBT_OK;
 }
 
 /* ---- links ---- */

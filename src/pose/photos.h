@@ -5,12 +5,12 @@
 
 #include "pose/job.h"
 
-/** All usable photos of `folder` and its sub-folders, sorted by name, with their sizes; warns of others.
-    GBT_ERR_FORMAT without any. */
+/** All usable photos of `folder` and its sub-folders, sorted by name, with their sizes and lenses; warns of
+   others. GBT_ERR_FORMAT without any. */
 gbt_status photos_list(job *j, const char *folder, gbt_error *err);
 
 /** Put photos of one size, camera model and focal length (EXIF) into one group; a film is one. */
-gbt_status photos_group(job *j, gbt_error *err);
+void photos_group(job *j);
 
 /** Hard links in DATA/images, or copies where the file system has none. */
 gbt_status photos_link(const job *j, gbt_error *err);

@@ -183,7 +183,7 @@ static gbt_status find_poses(job *j, gbt_error *err)
         GBT_TRY(photos_list(j, j->images, err));
     else if (!j->in_place)
         GBT_TRY(photos_link(j, err));
-    GBT_TRY(photos_group(j, err));
+    photos_group(j);
     GBT_TRY(colmap_stages(j, &colmap, err));
     return result_take(j, err);
 }

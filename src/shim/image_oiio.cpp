@@ -227,7 +227,8 @@ gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
     if (!o->input)
         return no_plugin(path, plugin, "reader", err);
     OIIO::ImageSpec config, spec;
-    config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored, not multiplied by alpha */
+    config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored: a PNG's are not multiplied by
+                                                         alpha; an EXR's are, whatever is asked for */
     o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
     if (!o->input->set_ioproxy(o->proxy.get()))
         return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path,
@@ -527,7 +528,7 @@ try {
     out->focal = spec.get_float_attribute("Exif:FocalLength", 0.0f);
     return GBT_OK;
 } catch (...) {
-    return caught(path, GBT_ERR_INTERNAL, err);
+    return caught(path, GBT_ERR_FORMAT, err);
 }
 
 extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,

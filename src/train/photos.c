@@ -251,28 +251,61 @@ static void load_one(size_t block, size_t begin, size_t end, void *context)
         job->photos->full[view] != NULL ? GBT_OK : read_into(job->photos, view, &job->error[block]);
 }
 
-gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err)
+static void try_one(size_t block, size_t begin, size_t end, void *context)
 {
-    size_t fitting = 0;
-    for (size_t bytes = p->bytes; fitting < count && bytes + full_bytes(p, views[fitting]) <= p->bytes_max;
-         fitting++)
-        bytes += full_bytes(p, views[fitting]);
-    count = fitting;
+    (void)end;
+    const load_job *job = context;
+    const size_t view = job->views[begin];
+    const gbt_camera camera = photos_camera(job->photos, view, 0);
+    image photo;
+    unsigned char *valid;
+    job->status[block] = scene_read_photo_valid(&job->photos->source->views[view], camera.width,
+                                                camera.height, &photo, &valid, &job->error[block]);
+    image_free(&photo);
+    mem_free(valid);
+}
+
+/* The first failure in the order of the views. */
+static gbt_status run_all(photos *p, const size_t *views, size_t count,
+                          void (*one)(size_t, size_t, size_t, void *), gbt_error *err)
+{
     load_job job = {.photos = p,
                     .views = views,
                     .status = mem_calloc(count, sizeof *job.status, "photos", err),
                     .error = mem_calloc(count, sizeof *job.error, "photos", err)};
     gbt_status status = job.status == NULL || job.error == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
-        parallel_blocks(count, 1, load_one, &job);
+        parallel_blocks(count, 1, one, &job);
     for (size_t i = 0; status == GBT_OK && i < count; i++)
         if (job.status[i] != GBT_OK)
             status = base_fail(err, job.status[i], "%s", job.error[i].text);
-        else
-            p->bytes += full_bytes(p, views[i]);
     mem_free(job.status);
     mem_free(job.error);
     return status;
+}
+
+/* How many of them, from the first on, may be kept beside those that are. */
+static size_t count_fitting(const photos *p, const size_t *views, size_t count)
+{
+    size_t fitting = 0;
+    for (size_t bytes = p->bytes; fitting < count && bytes + full_bytes(p, views[fitting]) <= p->bytes_max;
+         fitting++)
+        bytes += full_bytes(p, views[fitting]);
+    return fitting;
+}
+
+gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err)
+{
+    count = count_fitting(p, views, count);
+    GBT_TRY(run_all(p, views, count, load_one, err));
+    for (size_t i = 0; i < count; i++)
+        p->bytes += full_bytes(p, views[i]);
+    return GBT_OK;
+}
+
+gbt_status photos_try(photos *p, const size_t *views, size_t count, gbt_error *err)
+{
+    return run_all(p, views, count_fitting(p, views, count), try_one, err);
 }
 
 static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
@@ -281,6 +314,17 @@ static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
     GBT_TRY(photos_read_full(p, view, err));
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->full[view], out);
+    return GBT_OK;
+}
+
+gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *any, gbt_error *err)
+{
+    *any = false;
+    for (size_t i = 0; i < count && !*any; i++) {
+        GBT_TRY(photos_read_full(p, views[i], err));
+        const unsigned char *valid = p->full_valid[views[i]];
+        *any = valid == NULL || memchr(valid, 1, full_bytes(p, views[i]) / 3) != NULL;
+    }
     return GBT_OK;
 }
 

@@ -52,6 +52,10 @@ gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *
 /** Read a photo into p->full, if it is not there: it stays, or stays until the next that finds no room. */
 gbt_status photos_read_full(photos *p, size_t view, gbt_error *err);
 
+/** Read the photos of `views` and keep none: what fails now would fail when they are read later. As many, on
+    as many threads, as photos_load() would read. */
+gbt_status photos_try(photos *p, const size_t *views, size_t count, gbt_error *err);
+
 /** Camera of a photo that is divided: its size is round(stated / divide), at least 1. */
 gbt_camera photo_camera_divided(const gbt_camera *stated, double divide);
 
@@ -76,6 +80,9 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
  */
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
                              gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err);
+
+/** Whether some pixel of these photos means something: reads them at full size until one is found. */
+gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *any, gbt_error *err);
 
 /** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was
     not finite; NULL: all. */

@@ -152,6 +152,38 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
         t->scene.views[0].camera.height, need.least / 0x1p20, need.whole / 0x1p20);
 }
 
+/* Nothing would be learned, and no loss would tell. */
+static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
+{
+    bool any;
+    GBT_TRY(photos_any_valid(&t->photos, t->train_views, t->train_count, &any, err));
+    if (any)
+        return GBT_OK;
+    return base_fail(
+        err, GBT_ERR_FORMAT,
+        "%s: masks or alpha channels leave no pixel of any photo to train on (wanted light where "
+        "a photo counts)",
+        t->scene.folder);
+}
+
+/* What is held out is read after the last step, to score it: what could not be read then is told now. The
+   headers of all photos have been seen, which tell of files that are cut and of other shapes; damaged pixels
+   are looked for in no more photos than are trained on, so that a run takes at most twice as long to start.
+ */
+static gbt_status try_held_out(trainer *t, gbt_error *err)
+{
+    const size_t most = t->test_count < t->train_count ? t->test_count : t->train_count;
+    size_t *views = mem_alloc(most + 1, sizeof *views, "held-out views", err), count = 0;
+    if (views == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < t->scene.view_count && count < most; i++)
+        if (t->scene.views[i].is_test)
+            views[count++] = i;
+    const gbt_status status = photos_try(&t->photos, views, count, err);
+    mem_free(views);
+    return status;
+}
+
 /* Photos that differ in exposure contradict each other wherever they overlap. */
 static gbt_status choose_exposure(trainer *t, gbt_error *err)
 {
@@ -181,6 +213,8 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     GBT_TRY(choose_views(t, err));
     photo_check check;
     photo_check_all(&t->scene, &check);
+    if (check.refused.status != GBT_OK)
+        return base_fail(err, check.refused.status, "%s", check.refused.text);
     photo_check_warn(&check, data);
     choose_downscale(t);
     GBT_TRY(check_memory(t, err));
@@ -188,6 +222,8 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
+    GBT_TRY(need_valid_pixels(t, err));
+    GBT_TRY(try_held_out(t, err));
     GBT_TRY(checkpoint_hash_photos(&t->scene, &t->photos_hash, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));

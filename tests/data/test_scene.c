@@ -108,6 +108,53 @@ static void folder_layouts(void **state)
     scene_free(&s);
 }
 
+/* nerfstudio keeps the model in colmap/, where a transforms.json beside it wins; models elsewhere are named.
+ */
+static void colmap_elsewhere(void **state)
+{
+    const char *folder = *state;
+    scene s;
+    write_model(folder, false, true);
+    move(folder, "sparse", "colmap/sparse");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "colmap-bin");
+    assert_int_equal(s.view_count, VIEW_COUNT);
+    scene_free(&s);
+    write_text(folder, "transforms.json",
+               "{\"fl_x\": 8, \"frames\": [{\"file_path\": \"images/v1.png\", \"transform_matrix\": "
+               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
+    must(scene_load(folder, NULL, &s, &err));
+    assert_string_equal(s.source, "transforms");
+    scene_free(&s);
+    unlink(inside(folder, "transforms.json", 0));
+
+    char data[8192], says[3][512];
+    snprintf(data, sizeof data, "%s", inside(folder, "", 0));
+    if (data[strlen(data) - 1] == '/')
+        data[strlen(data) - 1] = '\0';
+    snprintf(says[0], sizeof says[0],
+             "a COLMAP model is in %.100s/sparse/1 (wanted: moved to %.100s/sparse/0)", data, data);
+    snprintf(says[1], sizeof says[1],
+             "a COLMAP model is in %.100s/dense/sparse (wanted the folder %.100s/dense)", data, data);
+    snprintf(says[2], sizeof says[2],
+             "a COLMAP model is in %.100s/a/b/sparse/0 (wanted the folder %.100s/a/b)", data, data);
+    static const char *const moves[3][2][2] = {
+        {{"colmap/sparse/0", "sparse/1"}, {"images/v1.png", "images/v1.png"}},
+        {{"sparse/1", "dense/sparse"}, {"images", "dense/images"}},
+        {{"dense/sparse", "a/b/sparse/0"}, {"dense/images", "a/b/images"}}};
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 2; k++)
+            move(folder, moves[i][k][0], moves[i][k][1]);
+        gbt_error err = {0};
+        assert_int_equal(scene_load(data, NULL, &s, &err), GBT_ERR_FORMAT);
+        check_message(GBT_ERR_FORMAT, &err);
+        if (strstr(err.text, says[i]) == NULL)
+            fail_msg("%s", err.text);
+    }
+    must(scene_load(inside(folder, "a/b", 0), NULL, &s, &err));
+    scene_free(&s);
+}
+
 static void binary_is_preferred(void **state)
 {
     const char *folder = *state;
@@ -671,6 +718,61 @@ static void blender_folder(void **state)
     scene_free(&s);
 }
 
+/* A file that holds out nothing is as none; what is trained on is not held out. */
+static void blender_without_a_split(void **state)
+{
+    const char *folder = *state;
+#define VIEW(name, x)                                                                                        \
+    "{\"file_path\": \"" name "\", \"transform_matrix\": [[1,0,0," x "],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}"
+#define BLENDER "{\"camera_angle_x\": 0.7, \"frames\": ["
+    static const struct {
+        const char *test, *val, *says;
+        size_t views;
+        bool has_split;
+        const char *held_out; /* the first by its name */
+    } cases[] = {
+        {BLENDER "]}", NULL, "", 2, false, "train/0"},
+        {BLENDER "]}", BLENDER VIEW("val/0", "5") "]}", "", 3, true, "val/0"},
+        {BLENDER VIEW("train/0", "1") "," VIEW("./train/1", "2") "]}", NULL,
+         "transforms_test.json: photos that are trained on, and so not held out: 2", 2, false, "train/0"},
+        {BLENDER VIEW("train/0.png", "1") "," VIEW("val/0", "2") "]}", BLENDER "]}",
+         "transforms_test.json: photos that are trained on, and so not held out: 1", 3, true, "val/0"},
+    };
+    char text[300];
+    scene s;
+    write_picture(folder, "train/0.png", 8, 6);
+    write_picture(folder, "train/1.png", 8, 6);
+    write_picture(folder, "val/0.png", 8, 6);
+    write_text(folder, "transforms_train.json", BLENDER VIEW("train/0", "1") "," VIEW("train/1", "2") "]}");
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        write_text(folder, "transforms_test.json", cases[i].test);
+        unlink(inside(folder, "transforms_val.json", 0));
+        if (cases[i].val != NULL)
+            write_text(folder, "transforms_val.json", cases[i].val);
+        text[0] = '\0';
+        gbt_listen(keep_text, text);
+        must(scene_load(folder, NULL, &s, &err));
+        gbt_listen(NULL, NULL);
+        assert_int_equal(text[0] != '\0', cases[i].says[0] != '\0');
+        if (strstr(text, cases[i].says) == NULL)
+            fail_msg("%zu: %s", i, text);
+        assert_int_equal(s.view_count, cases[i].views);
+        assert_int_equal(s.has_split, cases[i].has_split);
+        size_t first = 0;
+        while (!s.views[first].is_test)
+            first++;
+        assert_string_equal(s.views[first].name, cases[i].held_out);
+        assert_int_equal(count_tests(&s), 1);
+        scene_free(&s);
+    }
+    write_text(folder, "transforms_train.json", BLENDER "]}");
+    gbt_error err = {0};
+    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "transforms_train.json: frames is not a list with at least one entry"));
+#undef BLENDER
+#undef VIEW
+}
+
 /* nerfstudio's mask_path and train_filenames; instant-ngp's x_fov. */
 static void transforms_masks_and_split(void **state)
 {
@@ -730,6 +832,43 @@ static void transforms_masks_and_split(void **state)
         if (strstr(err.text, bad[i].says) == NULL)
             fail_msg("%s", err.text);
     }
+}
+
+/* Backslashes are slashes where nothing has the name as it is written. */
+static void transforms_from_windows(void **state)
+{
+    const char *folder = *state;
+    write_picture(folder, "images/a.png", 8, 6);
+    write_picture(folder, "images/b.png", 8, 6);
+    write_picture(folder, "images\\a.png.png", 8, 6);
+    write_picture(folder, "masks/a.png", 8, 6);
+    write_text(folder, "points/p.ply",
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+               "z\nend_header\n1 2 3\n");
+    write_text(folder, "transforms.json",
+               "{\"fl_x\": 10, \"ply_file_path\": \".\\\\points\\\\p.ply\", \"train_filenames\": "
+               "[\".\\\\images\\\\b.png\", \"images\\\\a.png.png\"], \"frames\": ["
+               "{\"file_path\": \"images\\\\a\", \"mask_path\": \"masks\\\\a.png\", \"transform_matrix\": "
+               "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},"
+               "{\"file_path\": \"images\\\\a.png.png\", \"transform_matrix\": "
+               "[[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]},"
+               "{\"file_path\": \".\\\\images\\\\b.png\", \"transform_matrix\": "
+               "[[1,0,0,12],[0,1,0,24],[0,0,1,36],[0,0,0,1]]}]}");
+    static const struct {
+        const char *name;
+        bool is_test, has_mask;
+    } want[] = {
+        {"images/a", true, true}, {"images/b.png", false, false}, {"images\\a.png.png", false, false}};
+    scene s;
+    must(scene_load(folder, NULL, &s, &err));
+    assert_int_equal(s.view_count, 3);
+    assert_int_equal(s.points.count, 1);
+    for (int i = 0; i < 3; i++) {
+        assert_string_equal(s.views[i].name, want[i].name);
+        assert_int_equal(s.views[i].is_test, want[i].is_test);
+        assert_int_equal(s.views[i].mask_path != NULL, want[i].has_mask);
+    }
+    scene_free(&s);
 }
 
 static void photos(void **state)
@@ -806,6 +945,49 @@ static void photo_alpha_and_nan(void **state)
     image_free(&im);
 }
 
+/* Colours of an EXR are times alpha already: the same photo as a PNG, where they are not. The last pixel
+   glows, and has no opacity. */
+static void alpha_of_an_exr(void **state)
+{
+    const char *folder = *state;
+    static const scene_alpha kinds[] = {SCENE_ALPHA_BLACK, SCENE_ALPHA_WHITE, SCENE_ALPHA_MASK};
+    static const float pixels[16] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f, 0.2f, 0.4f, 1, 0.8f, 0, 0, 0, 0},
+                       glow = 0.5f;
+    char path[2][4096];
+    image im;
+    must(image_alloc(&im, 4, 1, 4, &err));
+    for (int exr = 0; exr < 2; exr++) {
+        for (int i = 0; i < 16; i++)
+            im.pixels[i] = exr && i % 4 < 3 ? pixels[i] * pixels[i - i % 4 + 3] : pixels[i];
+        im.pixels[12] = exr ? glow : 0;
+        snprintf(path[exr], sizeof path[exr], "%s/alpha.%s", folder, exr ? "exr" : "png");
+        must(image_write(path[exr], &im, &err));
+    }
+    image_free(&im);
+    for (int k = 0; k < 3; k++) {
+        image read[2];
+        unsigned char *valid[2];
+        for (int exr = 0; exr < 2; exr++) {
+            const scene_view view = {
+                .name = path[exr], .path = path[exr], .alpha = kinds[k], .camera = {.width = 4, .height = 1}};
+            must(scene_read_photo_valid(&view, 4, 1, &read[exr], &valid[exr], &err));
+        }
+        for (int i = 0; i < 4; i++) {
+            const bool counts = kinds[k] != SCENE_ALPHA_MASK || pixels[4 * i + 3] >= 0.5f;
+            for (int exr = 0; exr < 2; exr++)
+                assert_true((valid[exr] == NULL || valid[exr][i]) == counts);
+            for (int c = 0; c < 3 && counts; c++) {
+                const float more = i == 3 && c == 0 ? glow : 0;
+                assert_true(fabsf(read[1].pixels[3 * i + c] - more - read[0].pixels[3 * i + c]) < 1e-6f);
+            }
+        }
+        for (int exr = 0; exr < 2; exr++) {
+            image_free(&read[exr]);
+            mem_free(valid[exr]);
+        }
+    }
+}
+
 /* A mask of 0 and 1, of 0 and 255, lossy, half the size; alpha as a mask, on white; and what is no mask. */
 static void masked_photos(void **state)
 {
@@ -861,6 +1043,43 @@ static void masked_photos(void **state)
                                                                      : 0.2f;
             assert_true(fabsf(im.pixels[3 * 5] - want) < 1e-6f && fabsf(im.pixels[0] - 0.2f) < 1e-6f);
         }
+        mem_free(valid);
+        image_free(&im);
+    }
+}
+
+/* Light in any channel counts, and only where it is opaque: 1, 2, 3 and 4 channels. */
+static void masks_of_any_color(void **state)
+{
+    const char *folder = *state;
+    char photo[4096], mask_path[4096];
+    snprintf(photo, sizeof photo, "%s/p.png", folder);
+    snprintf(mask_path, sizeof mask_path, "%s/m.png", folder);
+    write_picture(folder, "p.png", 4, 1);
+    static const struct {
+        int channels;
+        float values[16];
+        unsigned valid;
+    } cases[] = {
+        {1, {0, 1, 0.4f, 0.6f}, 0xa},
+        {2, {1, 0, 1, 1, 1, 0.4f, 0.6f, 1}, 0xa},
+        {3, {0, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0}, 0xe},
+        {3, {0.2f, 0.4f, 0.1f, 0.2f, 0.6f, 0.1f, 0.1f, 0, 1, 0.3f, 0.3f, 0.3f}, 0x6},
+        {4, {1, 1, 1, 0, 1, 0, 0, 1, 0, 0, 1, 0.4f, 0, 1, 0, 0.6f}, 0xa},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        const scene_view view = {
+            .name = photo, .path = photo, .mask_path = mask_path, .camera = {.width = 4, .height = 1}};
+        image im;
+        unsigned char *valid;
+        must(image_alloc(&im, 4, 1, cases[k].channels, &err));
+        memcpy(im.pixels, cases[k].values, 4 * (size_t)cases[k].channels * sizeof *im.pixels);
+        must(image_write(mask_path, &im, &err));
+        image_free(&im);
+        must(scene_read_photo_valid(&view, 4, 1, &im, &valid, &err));
+        for (unsigned i = 0; i < 4; i++)
+            if (valid[i] != (cases[k].valid >> i & 1))
+                fail_msg("case %zu, pixel %u", k, i);
         mem_free(valid);
         image_free(&im);
     }
@@ -977,6 +1196,7 @@ int main(void)
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test_setup_teardown(recentred, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(folder_layouts, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(colmap_elsewhere, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(binary_is_preferred, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(missing_photos, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masks_are_found, make_temporary, remove_temporary),
@@ -988,8 +1208,12 @@ int main(void)
                                         remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(blender_without_a_split, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(transforms_from_windows, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(alpha_of_an_exr, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(masks_of_any_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),
         cmocka_unit_test(extent_is_positive),
         cmocka_unit_test_setup_teardown(no_memory, make_temporary, remove_temporary),

@@ -14,7 +14,7 @@ static gbt_status read_json(const char *text, size_t size, raw_scene *raw, char 
 {
     unsigned char *copy = exact_copy(text, size);
     const source_file file = {"transforms.json", copy, size};
-    const gbt_status status = transforms_read(&file, folder_of_photos, raw, points_name, err);
+    const gbt_status status = transforms_read(&file, folder_of_photos, false, raw, points_name, err);
     free(copy);
     return status;
 }
@@ -37,6 +37,9 @@ typedef struct json_case {
 
 static json_case json_cases[] = {
     {"good", SIZED FRAMES, GBT_OK, NULL},
+    {"a byte order mark", "\xef\xbb\xbf" SIZED FRAMES, GBT_OK, NULL},
+    {"a byte order mark alone", "\xef\xbb\xbf", BAD, "transforms.json:1: not usable JSON"},
+    {"a byte order mark cut", "\xef\xbb", BAD, "not usable JSON"},
     {"42 empty", "", BAD, "transforms.json:1: file is empty"},
     {"42 not JSON", "hello", BAD, "transforms.json:1: not usable JSON"},
     {"42 truncated", "{\"w\": 8,\n\"frames\": [", BAD, "transforms.json:2: not usable JSON"},
@@ -135,6 +138,10 @@ static json_case json_cases[] = {
     {"54 no path", SIZED "\"frames\": [{" POSE "}]}", BAD, "file_path: wanted a string"},
     {"55 without extension, png", SIZED "\"frames\": [{\"file_path\": \"./a\", " POSE "}]}", GBT_OK, NULL},
     {"55 without extension, jpg", SIZED "\"frames\": [{\"file_path\": \"sub/b\", " POSE "}]}", GBT_OK, NULL},
+    {"slashes behind a dot", SIZED "\"frames\": [{\"file_path\": \".//./a\", " POSE "}]}", GBT_OK, NULL},
+    {"backslashes", SIZED "\"frames\": [{\"file_path\": \".\\\\sub\\\\b\", " POSE "}]}", GBT_OK, NULL},
+    {"backslashes leave", SIZED "\"frames\": [{\"file_path\": \"sub\\\\..\\\\..\\\\a.png\", " POSE "}]}", BAD,
+     "frame 0: image name leaves the data set by '..'"},
     {"55 no photo at all", SIZED "\"frames\": [{\"file_path\": \"c\", " POSE "}]}", GBT_ERR_IO,
      "none of the 1 photos exists, the first is c"},
     {"55 a folder is no photo", SIZED "\"frames\": [{\"file_path\": \"sub\", " POSE "}]}", GBT_ERR_IO,
@@ -165,6 +172,9 @@ static json_case json_cases[] = {
      "{\"fl_x\": 10, \"frames\": [{\"file_path\": \"sub/b.jpg\", " POSE "}]}", BAD, "b.jpg"},
     {"points named outside", "{\"ply_file_path\": \"../x.ply\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES,
      BAD, "leaves the data set"},
+    {"points behind backslashes outside",
+     "{\"ply_file_path\": \"..\\\\x.ply\", \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
+     "leaves the data set"},
     {"points name a number", "{\"ply_file_path\": 1, \"w\": 8, \"h\": 6, \"fl_x\": 10, " FRAMES, BAD,
      "ply_file_path: wanted a string"},
 };
@@ -400,7 +410,7 @@ static void try_json(const unsigned char *bytes, size_t size, void *context)
     raw_scene raw = {0};
     char *points_name = NULL;
     gbt_error err = {0};
-    const gbt_status status = transforms_read(&file, folder_of_photos, &raw, &points_name, &err);
+    const gbt_status status = transforms_read(&file, folder_of_photos, false, &raw, &points_name, &err);
     check_message(status, &err);
     if (status == GBT_OK) {
         check_raw(&raw);

@@ -72,7 +72,7 @@ void fuzz_transforms(const source_file *file)
     raw_scene raw = {0};
     char *points = NULL;
     gbt_error err = {0};
-    check(transforms_read(file, "/nowhere", &raw, &points, &err), &err);
+    check(transforms_read(file, "/nowhere", false, &raw, &points, &err), &err);
     mem_free(points);
     raw_free(&raw);
 }

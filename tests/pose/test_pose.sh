@@ -88,6 +88,14 @@ report $? "and why" "$(cat out)"
 "$program" train few -o few_run --iterations 2 --quiet >out 2>err
 report $? "train reads it" "$(cat err)"
 
+# ---- a photo whose header is whole, and whose pixels are not
+mkdir spoiled && cp "my photos"/*.png spoiled/
+printf 'spoiled' | dd of=spoiled/0002.png bs=1 seek=$(($(wc -c <spoiled/0002.png) / 2)) conv=notrunc 2>dd_said
+export FALSE_COLMAP=few
+says "a damaged photo is left out" 0 "^warning: left out: .*spoiled/0002.png@.*: PNG chunk is damaged" pose spoiled -o whole
+grep -q 'of 4 photos registered' out && [ -e whole/images/0001.png ] && [ ! -e whole/images/0002.png ]
+report $? "and not in the data set" "$(cat out err)"
+
 # ---- a signal is passed on, and the next run goes on where the last one was
 export FALSE_COLMAP=exhaustive_matcher-hangs
 PATH=$tools "$program" pose "my photos" -o stopped >out_stopped 2>err_stopped </dev/null &

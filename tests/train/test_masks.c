@@ -238,6 +238,70 @@ static void a_black_mask_leaves_nothing(void **state)
     json_decref(metrics);
 }
 
+/* Masks the wrong way round, say. */
+static void black_masks_alone_are_refused(void **state)
+{
+    (void)state;
+    const char *folder = in_root("all_black");
+    scene s = open_maskable_scene(folder);
+    image black;
+    assert_ok(image_alloc(&black, 48, 36, 1, NULL));
+    memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
+    for (size_t i = 0; i < s.view_count; i++) {
+        char path[2 * PATH_SIZE];
+        snprintf(path, sizeof path, "%s/masks/%.60s.png", folder, s.views[i].name);
+        assert_ok(image_write(path, &black, NULL));
+    }
+    image_free(&black);
+    scene_free(&s);
+    const gbt_train_def def = run_def();
+    train_fails(folder, in_root("all_black_run"), &def, GBT_ERR_FORMAT,
+                "leave no pixel of any photo to train on");
+}
+
+static void write_grey(const char *path, int width, int height)
+{
+    image im;
+    assert_ok(image_alloc(&im, width, height, 3, NULL));
+    for (int i = 0; i < 3 * width * height; i++)
+        im.pixels[i] = 0.5f;
+    assert_ok(image_write(path, &im, NULL));
+    image_free(&im);
+}
+
+/* Scoring comes last, but a run does not begin when it could not read a photo or a mask that is held out. */
+static void what_is_held_out_is_looked_at_first(void **state)
+{
+    (void)state;
+    const char *folder = in_root("held");
+    scene s = open_maskable_scene(folder);
+    assert_true(s.views[0].is_test);
+    char mask[2 * PATH_SIZE];
+    snprintf(mask, sizeof mask, "%s/masks/%.60s.png", folder, s.views[0].name);
+    const char *photo = s.views[0].path, *run = in_root("held_run");
+    const gbt_train_def def = run_def();
+    const bytes whole = read_bytes(photo);
+
+    assert_ok(file_write_atomic(photo, whole.data, whole.count - 20, NULL));
+    train_fails(folder, run, &def, GBT_ERR_FORMAT, "PNG is truncated");
+
+    write_grey(photo, 36, 48);
+    train_fails(folder, run, &def, GBT_ERR_FORMAT, "36 x 48 is not the shape of its camera, 48 x 36");
+
+    whole.data[whole.count / 2] ^= 1; /* pixels, which no header tells of */
+    assert_ok(file_write_atomic(photo, whole.data, whole.count, NULL));
+    train_fails(folder, run, &def, GBT_ERR_FORMAT, "PNG chunk is damaged");
+    whole.data[whole.count / 2] ^= 1;
+    assert_ok(file_write_atomic(photo, whole.data, whole.count, NULL));
+
+    write_grey(mask, 36, 48);
+    train_fails(folder, run, &def, GBT_ERR_FORMAT, "36 x 48 is not the shape of its photo, 48 x 36");
+    write_grey(mask, 24, 18);
+    train_ok(folder, run, &def);
+    mem_free(whole.data);
+    scene_free(&s);
+}
+
 /* ---- alpha ---- */
 
 /* An alpha channel with the shape of the masks; beneath it the colour stays. */
@@ -392,6 +456,8 @@ int main(void)
         cmocka_unit_test(masked_pixels_have_no_say),
         cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
+        cmocka_unit_test(black_masks_alone_are_refused),
+        cmocka_unit_test(what_is_held_out_is_looked_at_first),
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
         cmocka_unit_test(a_sky_that_is_not_learned_is_told),
         cmocka_unit_test(transparent_parts_lie_on_the_colour_asked_for),

@@ -19,8 +19,11 @@
 #include "data/json_out.h"
 #include "image/metrics.h"
 #include "run/loaded_run.h"
+#include "train/near.h"
 
 enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
+
+static const double near_loss_db = 1; /* from here on a warning */
 
 gbt_export_def gbt_export_def_default(void)
 {
@@ -34,8 +37,10 @@ typedef struct exported {
     const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
                                     floats */
     const gaussian_cloud *baked; /* what was written */
+    float near;                  /* that its readers draw it with */
     double to_bake;              /* of a file that we read */
     double to_model, to_photo;
+    double with_near; /* to_model, if the file kept the near distance */
     long long bytes;
 } exported;
 
@@ -154,6 +159,14 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
 
 /* ---- what is lost ---- */
 
+/* As other programs draw the view at `index`, with a near distance. */
+static trace_settings viewer_at(const exporting *e, size_t index, float near)
+{
+    trace_settings s = e->viewer;
+    s.t_near = view_near(near, &e->run.def, &e->run.scene.views[e->views[index]]);
+    return s;
+}
+
 /* One view of the model and of every file. */
 static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo,
                                const unsigned char *valid, gbt_error *err)
@@ -161,19 +174,26 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
     const double share = 1 / (double)e->view_count;
     image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
     const gaussian_cloud *drawn = NULL; /* by `bake` */
+    const trace_settings viewer = viewer_at(e, index, e->run.settings.t_near);
     image_quantize(photo);
     image_quantize(neural);
     e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
     for (size_t i = 0; i < e->file_count; i++) {
         exported *f = &e->files[i];
-        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->viewer, false, err));
+        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &viewer, false, err));
         image_quantize(shown);
         if (f->shown != f->baked && drawn != f->baked) {
-            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &e->viewer, false, err));
+            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &viewer, false, err));
             image_quantize(bake);
             drawn = f->baked;
         }
         f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
+        f->with_near += share * metric_psnr(shown, neural);
+        if (f->near != e->run.settings.t_near) { /* what it does not keep its readers do not know */
+            const trace_settings own = viewer_at(e, index, f->near);
+            GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &own, false, err));
+            image_quantize(shown);
+        }
         f->to_model += share * metric_psnr(shown, neural);
         f->to_photo += share * metric_psnr_valid(shown, photo, valid);
         if (f->path != e->folder || !e->held_out)
@@ -250,10 +270,9 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 }
 
 /* Write an output, and read back what it gives. */
-static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
+static gbt_status write_one(exporting *e, exported *f, const gaussian_cloud *cloud, gbt_error *err)
 {
-    exported *f = &e->files[e->file_count++];
-    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
+    const char *path = f->path;
     if (export_folder_is(path))
         return export_folder_write(path, &e->run, cloud, &f->bytes, err);
     GBT_TRY(gaussian_file_write(path, cloud, e->origin, err));
@@ -266,6 +285,15 @@ static gbt_status write_file(exporting *e, const char *path, const gaussian_clou
     for (size_t i = 0; i < 3 * f->back.count; i++)
         f->back.mean[i] = (float)((double)f->back.mean[i] + (f->back.origin[i % 3] - e->origin[i % 3]));
     f->shown = &f->back;
+    return GBT_OK;
+}
+
+static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
+{
+    exported *f = &e->files[e->file_count++];
+    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
+    GBT_TRY(write_one(e, f, cloud, err));
+    f->near = f->shown->near > 0 ? f->shown->near : trace_settings_default().t_near;
     return GBT_OK;
 }
 
@@ -323,9 +351,14 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
 {
     json_t *files = json_array();
     for (size_t i = 0; i < e->file_count; i++) {
-        json_array_append_new(files, file_to_json(e, &e->files[i]));
+        const exported *f = &e->files[i];
+        json_array_append_new(files, file_to_json(e, f));
         if (report != NULL)
-            say_file(e, &e->files[i], report);
+            say_file(e, f, report);
+        if (f->with_near - f->to_model > near_loss_db)
+            log_warn("%s: the format does not keep the near distance (%.3g), with which the file would be "
+                     "%.2f dB to the model instead of %.2f",
+                     f->path, (double)e->run.settings.t_near, f->with_near, f->to_model);
     }
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {

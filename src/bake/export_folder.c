@@ -118,9 +118,8 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     GBT_TRY(file_join(place, sizeof place, folder, name, err));
     GBT_TRY(file_make_folder(place, err));
     GBT_TRY(file_join(path, sizeof path, place, "point_cloud.ply", err));
-    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no comment before it */
+    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no mark before it */
     plain.antialiased = false;
-    plain.near = 0;
     GBT_TRY(gaussian_file_write(path, &plain, r->model.origin, err));
     struct stat info = {0};
     stat(path, &info);

@@ -10,6 +10,9 @@
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 
+/** The near distance: an attribute of our own, which others pass over. */
+#define USD_NEAR "gbtrace:near"
+
 /**
  * As gaussian_format.read: the first such prim of a text. Its coordinates are read with its translation; a
  * transformation of another kind is left out, with a warning, if it is not that half turn.

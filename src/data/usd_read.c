@@ -104,6 +104,7 @@ typedef enum field_id {
     HARMONICS,
     DEGREE,
     TRANSLATE,
+    NEAR,
     FIELDS
 } field_id;
 
@@ -118,7 +119,8 @@ static const struct {
                     {"opacities", 1},
                     {"radiance:sphericalHarmonicsCoefficients", 3},
                     {"radiance:sphericalHarmonicsDegree", 1},
-                    {"xformOp:translate", 3}};
+                    {"xformOp:translate", 3},
+                    {USD_NEAR, 1}};
 
 typedef struct numbers {
     float *values; /* of arrays */
@@ -291,6 +293,8 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
     out->count = 0; /* of those that are usable */
     memcpy(out->origin, p->translate, sizeof out->origin);
+    if (p->fields[NEAR].count == 1)
+        out->near = gaussian_cloud_near((double)p->fields[NEAR].values[0]);
     out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);

@@ -64,6 +64,14 @@ report $? "a result folder of photos at half size" "$(cat err out)"
 report $? "wide photos of plain Gaussians" "$(cat err out)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
+mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,0.3],[0,0,0,1]]}' "$1" "$2"; }
+printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 0.8)" "$(frame 0001 -0.8)" >close/transforms.json
+"$program" export run n.ply n.glb n.sog n.usda n.spz n.splat near/ --data close --refine 0 >out 2>err && "$program" render run -o near-model --data close >>err 2>&1
+for file in n.ply n.glb n.sog n.usda n.spz n.splat near; do
+    "$program" render "$file" -o near-drawn --data close >>err 2>&1 && "$program" compare near-drawn/*.png near-model/*.png --json |
+        awk -v file="$file" -F '[:,]' '{for (i = 1; i < NF; i++) if ($i ~ /"psnr"/) printf "^%s/*: .* 1 held-out views: %.2f dB to the model", file, $(i + 1)}' >pattern && grep -q -f pattern out || { cat pattern; break; }
+done >wrong 2>&1 && [ ! -s wrong ] && [ "$(grep -c '^warning: .*does not keep the near distance' err)" = 2 ] && grep -q '^warning: n.spz: the format does not keep the near distance (0\.53[0-9]*), with which' err
+report $? "the printed scores are those of the files, with their near distance or without" "$(cat wrong err out)"
 holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
 # ---- counts and places

@@ -13,6 +13,7 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/gaussian_file.h"
@@ -230,6 +231,27 @@ static gbt_status compare(exporting *e, gbt_error *err)
 
 /* ---- entry ---- */
 
+/* A file can be written where it goes; one inside the result folder where that can. */
+static gbt_status check_place(const char *path, const char *folder, gbt_error *err)
+{
+    if (path == NULL || (folder != NULL && strncmp(path, folder, strlen(folder)) == 0))
+        return GBT_OK;
+    return file_check_creatable(path, err);
+}
+
+static gbt_status check_places(const char *json, const char *const *outputs, size_t output_count,
+                               gbt_error *err)
+{
+    const char *folder = NULL;
+    for (size_t i = 0; i < output_count; i++)
+        folder = export_folder_is(outputs[i]) ? outputs[i] : folder;
+    if (folder != NULL)
+        GBT_TRY(file_check_folder_creatable(folder, err));
+    for (size_t i = 0; i < output_count; i++)
+        GBT_TRY(check_place(outputs[i], folder, err));
+    return check_place(json, folder, err);
+}
+
 static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs,
                         size_t output_count, gbt_error *err)
 {
@@ -251,7 +273,7 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
     }
     if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: a result folder is made once, of a run", input);
-    return GBT_OK;
+    return check_places(def->json, outputs, output_count, err);
 }
 
 static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)

@@ -388,8 +388,7 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     GBT_TRY(check_def(out, def, err));
-    if (!video_named(out))
-        GBT_TRY(file_make_folder(out, err));
+    GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_make_folder(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
         return GBT_ERR_NO_MEMORY;

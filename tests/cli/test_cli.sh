@@ -152,6 +152,13 @@ misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use 
 misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
 misuse 2 "--position_lr_init: not here; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
 misuse 4 "nothing: not a run folder (wanted what gbtrace train wrote)" metrics -m nothing
+# Where results go is looked at before anything else.
+misuse 4 "nowhere/x.ply: cannot create: No such file or directory" export nothing x.ply nowhere/x.ply
+misuse 4 "good.conf/x/: cannot create: Not a directory" export nothing good.conf/x/
+misuse 4 "nowhere/x.json: cannot create: No such file or directory" export nothing x.ply --json nowhere/x.json
+misuse 4 "nowhere/x.gbt: cannot create: No such file or directory" compress nothing -o nowhere/x.gbt
+misuse 4 "nowhere/x.json: cannot create: No such file or directory" compress nothing -o x.gbt --json nowhere/x.json
+misuse 4 "nowhere/x.mp4: cannot create: No such file or directory" render nothing -o nowhere/x.mp4 --path orbit
 misuse 2 "--output is missing (usage: gbtrace render RUN|GAUSSIANS [-o DIR])" render -m nothing
 misuse 2 "--iteration: not here; a run keeps its last model alone" render -m nothing --iteration 7000
 

@@ -298,6 +298,9 @@ misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o -
 misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
+for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--path orbit" "--preset fast" "--renderer raster"; do
+    misuse 2 "--output is missing (with --data, --downscale, --format, --insert, --path, --preset or --renderer nothing goes into tiny/renders)" render tiny $other
+done
 misuse 2 "--outputs: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
 misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
 for bad in 20x10x5 -3x4; do

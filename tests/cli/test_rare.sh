@@ -58,6 +58,10 @@ report $? "a result folder within a memory limit" "$(cat err out)"
 sed -i 's/resolution=1/resolution=2/' result/cfg_args && "$program" render result -o half --format exr >out 2>err && "$program" render result -o asked --format exr -d 1 >>out 2>>err &&
     "$program" compare whole/*0.exr asked/*0.exr >>out 2>>err && ! "$program" compare whole/*0.exr half/*0.exr >>out 2>>err && grep -q '16 x 12' err
 report $? "a result folder of photos at half size" "$(cat err out)"
+"$program" train made -o three-quarters --iterations 3 --downscale 1.33333 --quiet >out 2>err && "$program" export three-quarters narrow/ --refine 0 >>out 2>>err &&
+    grep -q 'resolution=24, ' narrow/cfg_args && grep -q '"width": 24,' narrow/cameras.json && "$program" render narrow -o narrow-drawn >>out 2>>err &&
+    "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png --json | grep -q '"width": 24, "height": 18, "psnr": 100,'
+report $? "a result folder of photos at another width" "$(cat err out; cat narrow/cfg_args; "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png)"
 "$program" export run plain.ply >out 2>err && "$program" make-scene tabletop -o wide --width 1920 --height 12 --views 3 --points 20 --samples 1 --quiet >>out 2>>err && "$program" render plain.ply -o usual --data wide >>out 2>>err &&
     "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
     grep -q '1600 x 10' err && grep -q '1920 x 12' err

@@ -12,6 +12,7 @@
 
 GBT_API_BEGIN
 
+/** Of plain Gaussians sh_degree and json alone count; the others are refused. */
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
     int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 500 */

@@ -252,6 +252,21 @@ static gbt_status check_places(const char *json, const char *const *outputs, siz
     return check_place(json, folder, err);
 }
 
+/* What plain Gaussians have no use for: they are only converted. */
+static gbt_status check_plain(const char *input, const gbt_export_def *def, gbt_error *err)
+{
+    static const char wanted[] = "wanted a trained model";
+    const gbt_export_def usual = gbt_export_def_default();
+    if (def->refine_steps != usual.refine_steps)
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d of %s (%s)", def->refine_steps, input,
+                         wanted);
+    if (def->backdrop != usual.backdrop)
+        return base_fail(err, GBT_ERR_ARGUMENT, "backdrop: not for %s (%s)", input, wanted);
+    if (def->data != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "data: not for %s (%s)", input, wanted);
+    return GBT_OK;
+}
+
 static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs,
                         size_t output_count, gbt_error *err)
 {
@@ -262,6 +277,8 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
     if (def->gaussians < 0 || (def->gaussians > 0 && gaussian_file_readable(input)))
         return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d of %s (wanted 0 or more, and a trained model)",
                          def->gaussians, input);
+    if (gaussian_file_readable(input))
+        GBT_TRY(check_plain(input, def, err));
     if (output_count < 1 || output_count > OUTPUTS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
                          output_count, (int)OUTPUTS_MAX);

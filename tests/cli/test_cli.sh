@@ -519,6 +519,11 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         grep -q ' that are blended least' out
     report $? "export keeps the Gaussians that are blended most" "$(cat err out)"
     misuse 2 "--gaussians: 10 of plain.ply (wanted 0 or more, and a trained model)" export plain.ply o.ply --gaussians 10
+    misuse 2 "--refine: 3 of plain.ply (wanted a trained model)" export plain.ply o.ply --refine 3
+    misuse 2 "--no-backdrop: not for plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
+    misuse 2 "--data: not for plain.ply (wanted a trained model)" export plain.ply o.ply --data made
+    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --camera x.json
+    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --path x.json
     misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000
     for file in plain.ply plain.splat plain.spz plain.glb; do
         prints "info of $file" "^$file: plain Gaussians$" info $file

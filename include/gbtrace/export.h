@@ -53,8 +53,8 @@ gbt_export_format gbt_export_format_at(int index);
  * results.json and per_view.json. Runs alone can be written so.
  *
  * @param input  [in] RUN (a folder with model.gbt), a model file, plain Gaussians, or a result folder of 3DGS
- * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before
- *                     any work
+ * @param outputs [in] [output_count] file names, at most 16, each written atomically; their endings and
+ *                     folders are checked before any work
  * @param report [in] open stream; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

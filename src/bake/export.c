@@ -22,7 +22,7 @@
 #include "run/loaded_run.h"
 #include "train/near.h"
 
-enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
+enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
 
 static const double near_loss_db = 1; /* from here on a warning */
 

@@ -515,6 +515,9 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         "$program" info all.$ending && "$program" export all.$ending again.ply || break
     done >>out 2>>err && [ "$(grep -c "gaussians $(sed -n 's/^  "gaussians": \([0-9]*\),$/\1/p' plain.json)," out)" = 5 ]
     report $? "every small format is written, looked into and converted" "$(cat err out)"
+    "$program" export run $("$program" export --help | sed -n 's,^  \(\.[a-z0-9.]*\) .*,each\1,p') each/ --refine 0 >out 2>err && [ "$(grep -c 'dB to the model' out)" = 10 ]
+    report $? "one export has room for all formats and the result folder" "$(cat err out)"
+    misuse 2 "plain.ply: 17 files to write (wanted 1 to 16)" export plain.ply $(seq -f %g.ply 16) -o 17.ply
     "$program" export run thin.sog --gaussians 1010 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1010,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
         grep -q ' that are blended least' out
     report $? "export keeps the Gaussians that are blended most" "$(cat err out)"

@@ -78,6 +78,19 @@ done >wrong 2>&1 && [ ! -s wrong ] && [ "$(grep -c '^warning: .*does not keep th
 report $? "the printed scores are those of the files, with their near distance or without" "$(cat wrong err out)"
 holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
+prim='def ParticleField3DGaussianSplat "one" { point3f[] positions = [(1, 2, 3)] quatf[] orientations = [(1, 0, 0, 0)] float[] opacities = [0.5] float3[] scales = [(1, 1, 1)]'
+moved='double3 xformOp:translate = (9, 0, 0) uniform token[] xformOpOrder = ["xformOp:translate"]'
+usd() { # NAME WARNINGS TEXT
+    printf '#usda 1.0\n%s\n' "$3" >one.usda
+    "$program" export one.usda one.ply >out 2>err && [ "$(grep -c '^warning: one.usda: the prim.s rotation and scale are left out, and all transformations of the prims that it is in;' err)" = "$2" ]
+    report $? "USD: $1" "$(cat err out)"
+}
+usd "a prim alone, with a translation" 0 "$prim $moved }"
+usd "a prim that is turned" 1 "$prim float xformOp:rotateY = 90 }"
+usd "a prim in one that is moved" 1 "def Xform \"all\" { $moved def Scope \"some\" { $prim } } }"
+usd "a prim in one that says so behind it" 1 "def Xform \"all\" { def Scope \"some\" { $prim } } $moved }"
+usd "a prim in one that is not moved, beside some that are" 0 "def Xform \"all\" { def Xform \"a\" { $moved } $prim } def Xform \"b\" { $moved } } def Xform \"c\" { $moved }"
+
 # ---- counts and places
 "$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]
 report $? "init tells how well anchors stand for points" "$(cat err out; cat counts.json)"

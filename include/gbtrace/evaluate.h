@@ -132,8 +132,8 @@ gbt_render_def gbt_render_def_default(void);
  * .gif (by the program ffmpeg, which must be there).
  *
  * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file
- * the first two are not used, and the last is refused. A path file needs no data set either. A film has its
- * name when it is whole, not before.
+ * or a path file `split` is not used, and the others are refused. A film has its name when it is whole, not
+ * before.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

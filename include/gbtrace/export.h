@@ -12,6 +12,7 @@
 
 GBT_API_BEGIN
 
+/** Of plain Gaussians sh_degree and json alone count; the others are refused. */
 typedef struct gbt_export_def {
     int sh_degree;    /* of the colours' dependence on the direction, 0 to 3. Default 3 */
     int refine_steps; /* steps that fit the plain Gaussians to the model's own pictures, >= 0. Default 500 */
@@ -52,8 +53,8 @@ gbt_export_format gbt_export_format_at(int index);
  * results.json and per_view.json. Runs alone can be written so.
  *
  * @param input  [in] RUN (a folder with model.gbt), a model file, plain Gaussians, or a result folder of 3DGS
- * @param outputs [in] [output_count] file names, each written atomically; their endings are checked before
- *                     any work
+ * @param outputs [in] [output_count] file names, at most 16, each written atomically; their endings and
+ *                     folders are checked before any work
  * @param report [in] open stream; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

@@ -13,14 +13,18 @@
 #include "base/clock.h"
 #include "base/def.h"
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "image/metrics.h"
 #include "run/loaded_run.h"
+#include "train/near.h"
 
-enum { OUTPUTS_MAX = 8, VIEWS_MAX = 16 };
+enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
+
+static const double near_loss_db = 1; /* from here on a warning */
 
 gbt_export_def gbt_export_def_default(void)
 {
@@ -34,8 +38,10 @@ typedef struct exported {
     const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
                                     floats */
     const gaussian_cloud *baked; /* what was written */
+    float near;                  /* that its readers draw it with */
     double to_bake;              /* of a file that we read */
     double to_model, to_photo;
+    double with_near; /* to_model, if the file kept the near distance */
     long long bytes;
 } exported;
 
@@ -154,6 +160,14 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
 
 /* ---- what is lost ---- */
 
+/* As other programs draw the view at `index`, with a near distance. */
+static trace_settings viewer_at(const exporting *e, size_t index, float near)
+{
+    trace_settings s = e->viewer;
+    s.t_near = view_near(near, &e->run.def, &e->run.scene.views[e->views[index]]);
+    return s;
+}
+
 /* One view of the model and of every file. */
 static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo,
                                const unsigned char *valid, gbt_error *err)
@@ -161,19 +175,26 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
     const double share = 1 / (double)e->view_count;
     image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
     const gaussian_cloud *drawn = NULL; /* by `bake` */
+    const trace_settings viewer = viewer_at(e, index, e->run.settings.t_near);
     image_quantize(photo);
     image_quantize(neural);
     e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
     for (size_t i = 0; i < e->file_count; i++) {
         exported *f = &e->files[i];
-        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &e->viewer, false, err));
+        GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &viewer, false, err));
         image_quantize(shown);
         if (f->shown != f->baked && drawn != f->baked) {
-            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &e->viewer, false, err));
+            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &viewer, false, err));
             image_quantize(bake);
             drawn = f->baked;
         }
         f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
+        f->with_near += share * metric_psnr(shown, neural);
+        if (f->near != e->run.settings.t_near) { /* what it does not keep its readers do not know */
+            const trace_settings own = viewer_at(e, index, f->near);
+            GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &own, false, err));
+            image_quantize(shown);
+        }
         f->to_model += share * metric_psnr(shown, neural);
         f->to_photo += share * metric_psnr_valid(shown, photo, valid);
         if (f->path != e->folder || !e->held_out)
@@ -210,6 +231,42 @@ static gbt_status compare(exporting *e, gbt_error *err)
 
 /* ---- entry ---- */
 
+/* A file can be written where it goes; one inside the result folder where that can. */
+static gbt_status check_place(const char *path, const char *folder, gbt_error *err)
+{
+    if (path == NULL || (folder != NULL && strncmp(path, folder, strlen(folder)) == 0))
+        return GBT_OK;
+    return file_check_creatable(path, err);
+}
+
+static gbt_status check_places(const char *json, const char *const *outputs, size_t output_count,
+                               gbt_error *err)
+{
+    const char *folder = NULL;
+    for (size_t i = 0; i < output_count; i++)
+        folder = export_folder_is(outputs[i]) ? outputs[i] : folder;
+    if (folder != NULL)
+        GBT_TRY(file_check_folder_creatable(folder, err));
+    for (size_t i = 0; i < output_count; i++)
+        GBT_TRY(check_place(outputs[i], folder, err));
+    return check_place(json, folder, err);
+}
+
+/* What plain Gaussians have no use for: they are only converted. */
+static gbt_status check_plain(const char *input, const gbt_export_def *def, gbt_error *err)
+{
+    static const char wanted[] = "wanted a trained model";
+    const gbt_export_def usual = gbt_export_def_default();
+    if (def->refine_steps != usual.refine_steps)
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d of %s (%s)", def->refine_steps, input,
+                         wanted);
+    if (def->backdrop != usual.backdrop)
+        return base_fail(err, GBT_ERR_ARGUMENT, "backdrop: not for %s (%s)", input, wanted);
+    if (def->data != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "data: not for %s (%s)", input, wanted);
+    return GBT_OK;
+}
+
 static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs,
                         size_t output_count, gbt_error *err)
 {
@@ -220,6 +277,8 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
     if (def->gaussians < 0 || (def->gaussians > 0 && gaussian_file_readable(input)))
         return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d of %s (wanted 0 or more, and a trained model)",
                          def->gaussians, input);
+    if (gaussian_file_readable(input))
+        GBT_TRY(check_plain(input, def, err));
     if (output_count < 1 || output_count > OUTPUTS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
                          output_count, (int)OUTPUTS_MAX);
@@ -231,7 +290,7 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
     }
     if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: a result folder is made once, of a run", input);
-    return GBT_OK;
+    return check_places(def->json, outputs, output_count, err);
 }
 
 static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)
@@ -250,10 +309,9 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 }
 
 /* Write an output, and read back what it gives. */
-static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
+static gbt_status write_one(exporting *e, exported *f, const gaussian_cloud *cloud, gbt_error *err)
 {
-    exported *f = &e->files[e->file_count++];
-    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
+    const char *path = f->path;
     if (export_folder_is(path))
         return export_folder_write(path, &e->run, cloud, &f->bytes, err);
     GBT_TRY(gaussian_file_write(path, cloud, e->origin, err));
@@ -266,6 +324,15 @@ static gbt_status write_file(exporting *e, const char *path, const gaussian_clou
     for (size_t i = 0; i < 3 * f->back.count; i++)
         f->back.mean[i] = (float)((double)f->back.mean[i] + (f->back.origin[i % 3] - e->origin[i % 3]));
     f->shown = &f->back;
+    return GBT_OK;
+}
+
+static gbt_status write_file(exporting *e, const char *path, const gaussian_cloud *cloud, gbt_error *err)
+{
+    exported *f = &e->files[e->file_count++];
+    *f = (exported){.path = path, .shown = cloud, .baked = cloud};
+    GBT_TRY(write_one(e, f, cloud, err));
+    f->near = f->shown->near > 0 ? f->shown->near : trace_settings_default().t_near;
     return GBT_OK;
 }
 
@@ -323,9 +390,14 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
 {
     json_t *files = json_array();
     for (size_t i = 0; i < e->file_count; i++) {
-        json_array_append_new(files, file_to_json(e, &e->files[i]));
+        const exported *f = &e->files[i];
+        json_array_append_new(files, file_to_json(e, f));
         if (report != NULL)
-            say_file(e, &e->files[i], report);
+            say_file(e, f, report);
+        if (f->with_near - f->to_model > near_loss_db)
+            log_warn("%s: the format does not keep the near distance (%.3g), with which the file would be "
+                     "%.2f dB to the model instead of %.2f",
+                     f->path, (double)e->run.settings.t_near, f->with_near, f->to_model);
     }
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {

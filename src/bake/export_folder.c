@@ -38,6 +38,18 @@ static void put_path(const char *path, char *out, size_t size)
     out[used] = '\0';
 }
 
+/* By what photos are divided, or the width of the pictures; -1, which leaves it open, where they differ. */
+static int resolution_of(const loaded_run *r)
+{
+    if (result_resolution_divides(r->def.downscale))
+        return (int)r->def.downscale;
+    const int width = photos_camera(&r->photos, 0, 0).width;
+    for (size_t i = 1; i < r->scene.view_count; i++)
+        if (photos_camera(&r->photos, i, 0).width != width)
+            return -1;
+    return result_resolution_divides(width) ? -1 : width;
+}
+
 static gbt_status write_settings(const char *folder, const loaded_run *r, int sh_degree, gbt_error *err)
 {
     char path[PATH_SIZE], source[PATH_SIZE], result[PATH_SIZE], text[3 * PATH_SIZE];
@@ -46,11 +58,10 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
                        laid_on[0] > 0; /* any other background is in the file, or black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
-    const int resolution = result_resolution_divides(r->def.downscale) ? (int)r->def.downscale : -1;
     snprintf(text, sizeof text,
              "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=%d, "
              "white_background=%s, data_device='cpu', eval=True)",
-             sh_degree, source, result, resolution, white ? "True" : "False");
+             sh_degree, source, result, resolution_of(r), white ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
     return file_write_atomic(path, text, strlen(text), err);
 }
@@ -118,9 +129,8 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     GBT_TRY(file_join(place, sizeof place, folder, name, err));
     GBT_TRY(file_make_folder(place, err));
     GBT_TRY(file_join(path, sizeof path, place, "point_cloud.ply", err));
-    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no comment before it */
+    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no mark before it */
     plain.antialiased = false;
-    plain.near = 0;
     GBT_TRY(gaussian_file_write(path, &plain, r->model.origin, err));
     struct stat info = {0};
     stat(path, &info);

@@ -131,14 +131,51 @@ static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_coun
     return GBT_OK;
 }
 
+/* Where a path is: of "a/b" and of "a/": "a". */
+static void folder_of(const char *path, char folder[PATH_LIMIT])
+{
+    const char *slash = strrchr(path, '/');
+    if (slash == NULL)
+        snprintf(folder, PATH_LIMIT, ".");
+    else
+        snprintf(folder, PATH_LIMIT, "%.*s", (int)(slash == path ? 1 : slash - path), path);
+}
+
+/* Can `folder` hold what `path` names? */
+static gbt_status check_folder(const char *folder, const char *path, gbt_error *err)
+{
+    char inside[PATH_LIMIT];
+    GBT_TRY(file_join(inside, sizeof inside, folder, ".", err)); /* a file has no such entry */
+    return access(inside, W_OK | X_OK) == 0
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
+}
+
+gbt_status file_check_creatable(const char *path, gbt_error *err)
+{
+    char folder[PATH_LIMIT];
+    folder_of(path, folder);
+    GBT_TRY(check_folder(folder, path, err));
+    return file_is_folder(path) ? base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(EISDIR))
+                                : GBT_OK;
+}
+
+gbt_status file_check_folder_creatable(const char *path, gbt_error *err)
+{
+    char folder[PATH_LIMIT];
+    snprintf(folder, sizeof folder, "%s", path);
+    while (!file_exists(folder)) { /* ends at "/" or "." */
+        char above[PATH_LIMIT];
+        folder_of(folder, above);
+        memcpy(folder, above, sizeof folder);
+    }
+    return check_folder(folder, path, err);
+}
+
 void file_sync_folder_of(const char *path)
 {
     char folder[PATH_LIMIT];
-    const char *slash = strrchr(path, '/');
-    if (slash == NULL)
-        snprintf(folder, sizeof folder, ".");
-    else
-        snprintf(folder, sizeof folder, "%.*s", (int)(slash == path ? 1 : slash - path), path);
+    folder_of(path, folder);
     const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd >= 0) {
         fsync(fd); /* some file systems refuse this on folders; the rename itself has already succeeded */

@@ -43,6 +43,13 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
+/** Before work whose result goes there: GBT_ERR_IO when a file cannot be created or replaced, because its
+    folder is not there or cannot be written, or it is a folder itself. Nothing is written. */
+gbt_status file_check_creatable(const char *path, gbt_error *err);
+
+/** The same for file_make_folder() and what goes into the folder. */
+gbt_status file_check_folder_creatable(const char *path, gbt_error *err);
+
 /** fsync of the folder that `path` is in, as far as its file system knows that. */
 void file_sync_folder_of(const char *path);
 

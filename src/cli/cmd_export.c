@@ -43,6 +43,7 @@ static const option *options(int *count)
         {.name = "no-backdrop",
          .kind = OPTION_FLAG_OFF,
          .value = &def.backdrop,
+         .field = "backdrop",
          .help = "leave out the sphere of Gaussians that is the model's background; viewers then draw black "
                  "there"},
         DATA_OPTION(&def.data, "use the cameras of this data set instead of the one it was trained on"),
@@ -87,6 +88,6 @@ const command command_export = {
     .usage = "RUN|MODEL.gbt|GAUSSIANS OUT...",
     .options = options,
     .min_operands = 1,
-    .max_operands = 9,
+    .max_operands = 17, /* what is read, and the 16 outputs that gbt_export() takes */
     .run = run,
     .endings = format_words};

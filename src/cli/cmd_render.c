@@ -28,8 +28,9 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &out,
          .value_name = "DIR",
-         .help = "folder for the images; default: RUN/renders/SPLIT; with --path also a film: .mp4, .webm, "
-                 ".gif (by ffmpeg)"},
+         .help =
+             "folder for the images; default for views as the run itself draws them: RUN/renders/SPLIT; with "
+             "--path also a film: .mp4, .webm, .gif (by ffmpeg)"},
         RUN_OPTION(NULL),
         {.name = "split",
          .kind = OPTION_CHOICE,
@@ -152,6 +153,14 @@ static const option *options(int *count)
     return rows;
 }
 
+/* RUN/renders/test holds the scored pictures, so no others may go there. */
+static bool draws_as_the_run(void)
+{
+    const gbt_render_def own = gbt_render_def_default();
+    return def.data == NULL && def.downscale == own.downscale && def.format == own.format &&
+           def.insert == NULL && def.path == NULL && def.preset == own.preset && def.renderer == own.renderer;
+}
+
 static int run(const operands *given)
 {
     if (size != NULL && !read_size(size, &def.width, &def.height))
@@ -163,6 +172,11 @@ static int run(const operands *given)
         if (stat(given->value[0], &info) != 0 || !S_ISDIR(info.st_mode))
             return command_misused("--output is missing (usage: gbtrace %s %s)", command_render.name,
                                    command_render.usage);
+        if (def.camera == NULL && !draws_as_the_run())
+            return command_misused(
+                "--output is missing (with --data, --downscale, --format, --insert, --path, "
+                "--preset or --renderer nothing goes into %s/renders)",
+                given->value[0]);
         if (snprintf(folder, sizeof folder, "%s/renders%s%s", given->value[0], def.camera == NULL ? "/" : "",
                      def.camera == NULL ? split_names[def.split] : "") >= (int)sizeof folder)
             return command_misused("%.60s...: the path is too long", given->value[0]);

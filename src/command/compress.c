@@ -199,6 +199,9 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
     GBT_TRY(def_check(def->cookie_, "gbt_compress_def_default", err));
     if (!def->lossless && !(def->quality >= 20 && def->quality <= 90))
         return base_fail(err, GBT_ERR_ARGUMENT, "quality: %g dB (wanted 20 to 90)", def->quality);
+    GBT_TRY(file_check_creatable(out, err));
+    if (def->json != NULL)
+        GBT_TRY(file_check_creatable(def->json, err));
     compression c = {0};
     char path[4096];
     bool has_views = false;

@@ -134,7 +134,9 @@ static void put_header(sink *s, const gaussian_cloud *cloud, size_t rest)
 {
     char line[96];
     sink_put_text(s, "ply\nformat binary_little_endian 1.0\n");
-    gaussian_ply_put_comments(s, cloud);
+    if (cloud->antialiased)
+        sink_put_text(s, GAUSSIAN_PLY_MIP "\n");
+    gaussian_ply_put_near(s, cloud);
     snprintf(line, sizeof line, "element chunk %zu\n", (cloud->count + CHUNK_ROWS - 1) / CHUNK_ROWS);
     sink_put_text(s, line);
     put_names(s, "float", chunk_names, CHUNK_COLUMNS);

@@ -88,6 +88,8 @@ bool gaussian_limit_scales(float scale_log[3])
     return changed;
 }
 
+float gaussian_cloud_near(double said) { return said > 0 && said < 1e30 ? (float)said : 0; }
+
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name)
 {
     if (cloud->dropped + cloud->identity_rotations + cloud->scales_clamped == 0)

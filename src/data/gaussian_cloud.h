@@ -36,8 +36,9 @@ typedef struct gaussian_cloud {
     int sh_degree;    /* 0..3 */
     bool antialiased; /* made to be drawn as wide as pixels (docs/antialiasing.md), without a blur on top: of
                          the formats that can say so */
-    float near; /* nothing nearer to a camera is to be drawn, scene units; 0: nobody says. Only .ply does */
-    size_t dropped;            /* rows with a value that is not usable */
+    float near;     /* nothing nearer to a camera is to be drawn, scene units; 0: nobody says: .spz and .splat
+                       cannot */
+    size_t dropped; /* rows with a value that is not usable */
     size_t identity_rotations; /* zero quaternions, read as no rotation */
     size_t scales_clamped;     /* rows with a scale raised to 1e-4 of their largest */
 } gaussian_cloud;
@@ -61,6 +62,9 @@ typedef struct gaussian_row {
  * GAUSSIAN_SCALE_LOG_LIMIT. What was mended is counted too.
  */
 void gaussian_cloud_add(gaussian_cloud *out, const gaussian_row *row);
+
+/** The near distance that a file says; 0 where it is not usable. */
+float gaussian_cloud_near(double said);
 
 /** A warning in one line when rows were left out or mended: how many, and how. `name` of the file. */
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name);

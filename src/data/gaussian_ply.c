@@ -128,9 +128,7 @@ static float near_of(const source_file *file, const ply_header *header)
     size_t length = 0;
     while (text + length < end && text[length] != '\n' && text[length] != '\r')
         length++;
-    if (number_parse_double(text, length, &near) != NUMBER_OK || !(near > 0 && near < 1e30))
-        return 0;
-    return (float)near;
+    return number_parse_double(text, length, &near) == NUMBER_OK ? gaussian_cloud_near(near) : 0;
 }
 
 /* A line of the header; a later one would count, but nobody writes two. */

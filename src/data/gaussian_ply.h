@@ -16,12 +16,10 @@
 /** The line of our own that says how near to a camera they are drawn, and a number. */
 #define GAUSSIAN_PLY_NEAR "comment gbtrace near "
 
-/** What goes behind the line of the format: those lines, as far as they hold. */
-static inline void gaussian_ply_put_comments(sink *s, const gaussian_cloud *cloud)
+/** That line, where it holds. */
+static inline void gaussian_ply_put_near(sink *s, const gaussian_cloud *cloud)
 {
     char line[64];
-    if (cloud->antialiased)
-        sink_put_text(s, GAUSSIAN_PLY_MIP "\n");
     if (!(cloud->near > 0))
         return;
     snprintf(line, sizeof line, GAUSSIAN_PLY_NEAR "%.9g\n", (double)cloud->near);

@@ -37,9 +37,11 @@ static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const
     sink s = {.err = err};
     char line[128];
     sink_put_text(&s, "ply\nformat binary_little_endian 1.0\n");
-    gaussian_ply_put_comments(&s, cloud);
+    if (cloud->antialiased)
+        sink_put_text(&s, GAUSSIAN_PLY_MIP "\n");
     snprintf(line, sizeof line, "element vertex %zu\n", cloud->count);
     sink_put_text(&s, line);
+    gaussian_ply_put_near(&s, cloud); /* here: the viewer of 3DGS wants the count in the third line */
     sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "
                       "float ny\nproperty float nz\n");
     put_properties(&s, "f_dc_", 3);

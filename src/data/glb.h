@@ -18,6 +18,9 @@ enum {
     GLB_POINTS = 0 /* mode */
 };
 
+/** The near distance, a number in the `extras` of `asset`, which are for what others need not know. */
+#define GLB_NEAR "gbtrace_near"
+
 /** The first primitive with KHR_gaussian_splatting, neither compressed nor sparse; the translation of its
    node becomes the origin. */
 gbt_status glb_read(const source_file *file, gaussian_cloud *out, gbt_error *err);

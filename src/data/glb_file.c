@@ -97,18 +97,22 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
 }
 
 /* The origin is the node's place, where numbers are doubles. */
-static json_t *document(const glb *g, const double origin[3])
+static json_t *document(const glb *g, const gaussian_cloud *cloud, const double origin[3])
 {
     json_t *primitive =
         json_pack("{s:i,s:O,s:{s:{s:s,s:s,s:s,s:s}}}", "mode", (int)GLB_POINTS, "attributes", g->attributes,
                   "extensions", "KHR_gaussian_splatting", "kernel", "ellipse", "colorSpace",
                   "srgb_rec709_display", "sortingMethod", "cameraDistance", "projection", "perspective");
-    return json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i,s:[f,f,f]}],s:[{s:[i]}],s:i}",
-                     "asset", "version", "2.0", "generator", "gbtrace", "extensionsUsed",
-                     "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size,
-                     "bufferViews", g->views, "accessors", g->accessors, "meshes", "primitives", primitive,
-                     "nodes", "mesh", 0, "translation", 0 - origin[0], 0 - origin[1], origin[2], "scenes",
-                     "nodes", 0, "scene", 0);
+    json_t *root =
+        json_pack("{s:{s:s,s:s},s:[s],s:[{s:I}],s:O,s:O,s:[{s:[o]}],s:[{s:i,s:[f,f,f]}],s:[{s:[i]}],s:i}",
+                  "asset", "version", "2.0", "generator", "gbtrace", "extensionsUsed",
+                  "KHR_gaussian_splatting", "buffers", "byteLength", (json_int_t)g->data.size, "bufferViews",
+                  g->views, "accessors", g->accessors, "meshes", "primitives", primitive, "nodes", "mesh", 0,
+                  "translation", 0 - origin[0], 0 - origin[1], origin[2], "scenes", "nodes", 0, "scene", 0);
+    if (cloud->near > 0)
+        json_object_set_new(json_object_get(root, "asset"), "extras",
+                            json_pack("{s:f}", GLB_NEAR, (double)cloud->near));
+    return root;
 }
 
 static gbt_status write_chunks(const char *path, const glb *g, const char *json, gbt_error *err)
@@ -156,7 +160,7 @@ static gbt_status write_glb(const char *path, const gaussian_cloud *cloud, const
     put_harmonics(&g, cloud);
     gbt_status status = g.data.status;
     if (status == GBT_OK) {
-        json_t *root = document(&g, origin);
+        json_t *root = document(&g, cloud, origin);
         char *json =
             root == NULL ? NULL : json_dumps(root, JSON_COMPACT | JSON_SORT_KEYS | JSON_REAL_PRECISION(17));
         status = json == NULL ? base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path)

@@ -243,6 +243,8 @@ static gbt_status read_root(reading *r, gaussian_cloud *out, gbt_error *err)
         take(r, &c, i, out);
     for (int k = 0; k < 3; k++)
         out->origin[k] = (k < 2 ? 0 - place[k] : place[k]);
+    const json_t *extras = json_object_get(json_object_get(r->root, "asset"), "extras");
+    out->near = gaussian_cloud_near(json_number_value(json_object_get(extras, GLB_NEAR)));
     return out->count > 0 ? GBT_OK
                           : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
                                       r->file->name, out->dropped);

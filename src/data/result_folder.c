@@ -23,12 +23,13 @@ bool result_resolution_divides(double resolution)
     return resolution == 1 || resolution == 2 || resolution == 4 || resolution == 8;
 }
 
-static double find_downscale(const char *text)
+static void find_resolution(const char *text, result_folder *out)
 {
     static const char key[] = "resolution=";
     const char *at = strstr(text, key);
     const double value = at != NULL ? (double)strtol(at + sizeof key - 1, NULL, 10) : 0;
-    return result_resolution_divides(value) ? value : 0;
+    out->downscale = result_resolution_divides(value) ? value : 0;
+    out->width = out->downscale == 0 && value > 0 && value <= 1 << 20 ? (int)value : 0;
 }
 
 static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)
@@ -42,7 +43,7 @@ static gbt_status read_settings(const char *folder, result_folder *out, gbt_erro
     GBT_TRY(file_read(path, &bytes, &size, err));
     find_text((const char *)bytes, "source_path='", out->source, sizeof out->source);
     out->white_background = strstr((const char *)bytes, "white_background=True") != NULL;
-    out->downscale = find_downscale((const char *)bytes);
+    find_resolution((const char *)bytes, out);
     mem_free(bytes);
     return GBT_OK;
 }

@@ -17,6 +17,7 @@ typedef struct result_folder {
     char source[RESULT_PATH_SIZE]; /* cfg_args' source_path, the data set; empty when it does not say */
     bool white_background;         /* cfg_args */
     double downscale;              /* cfg_args' resolution, of the data set's photos; 0: it does not say */
+    int width;                     /* the same as the width that photos are brought to; 0: it is no width */
 } result_folder;
 
 /**
@@ -25,8 +26,8 @@ typedef struct result_folder {
  */
 gbt_status result_folder_find(const char *folder, result_folder *out, bool *found, gbt_error *err);
 
-/** Whether cfg_args' `resolution=` of this value divides the photos' width and height; others are a width, or
- * leave it open. */
+/** Whether cfg_args' `resolution=` of this value divides the photos' width and height; others are the
+ * width that they are brought to, and -1 leaves it open (3DGS, utils/camera_utils.py). */
 bool result_resolution_divides(double resolution);
 
 #endif

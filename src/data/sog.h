@@ -12,6 +12,9 @@ enum {
     SOG_ENTRIES_PER_ROW = 64 /* of the table of harmonics */
 };
 
+/** The near distance, a number in `asset` of meta.json. */
+#define SOG_NEAR "gbtrace_near"
+
 /** As gaussian_format.read. */
 gbt_status sog_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 

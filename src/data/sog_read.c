@@ -176,6 +176,8 @@ static gbt_status read_all(bundle *b, gaussian_cloud *out, gbt_error *err)
     const char *model = json_string_value(json_object_get(b->meta, "model"));
     out->antialiased = json_is_true(json_object_get(b->meta, "antialias")) ||
                        (model != NULL && strcmp(model, "antialiased") == 0);
+    const json_t *near = json_object_get(json_object_get(b->meta, "asset"), SOG_NEAR);
+    out->near = gaussian_cloud_near(json_number_value(near));
     for (size_t i = 0; i < b->count; i++) {
         gaussian_row row = {0};
         unpack(b, i, &row);

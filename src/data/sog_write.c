@@ -216,6 +216,8 @@ static gbt_status put_tables(writing *w)
                         (json_int_t)cloud->count, "antialias", (int)cloud->antialiased);
     if (cloud->antialiased)
         json_object_set_new(w->meta, "model", json_string("antialiased"));
+    if (cloud->near > 0)
+        json_object_set_new(json_object_get(w->meta, "asset"), SOG_NEAR, json_real((double)cloud->near));
     GBT_TRY(put_positions(w));
     GBT_TRY(put_rotations(w));
     GBT_TRY(put_levels(w, cloud->scale_log, 3, false, "scales", "scales.webp"));

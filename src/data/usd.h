@@ -10,9 +10,13 @@
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 
+/** The near distance: an attribute of our own, which others pass over. */
+#define USD_NEAR "gbtrace:near"
+
 /**
  * As gaussian_format.read: the first such prim of a text. Its coordinates are read with its translation; a
- * transformation of another kind is left out, with a warning, if it is not that half turn.
+ * transformation of another kind is left out, with a warning, if it is not that half turn, and so are all
+ * transformations of the prims that it is in.
  */
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 

@@ -104,6 +104,7 @@ typedef enum field_id {
     HARMONICS,
     DEGREE,
     TRANSLATE,
+    NEAR,
     FIELDS
 } field_id;
 
@@ -118,7 +119,8 @@ static const struct {
                     {"opacities", 1},
                     {"radiance:sphericalHarmonicsCoefficients", 3},
                     {"radiance:sphericalHarmonicsDegree", 1},
-                    {"xformOp:translate", 3}};
+                    {"xformOp:translate", 3},
+                    {USD_NEAR, 1}};
 
 typedef struct numbers {
     float *values; /* of arrays */
@@ -188,19 +190,24 @@ static void skip_value(reading *r)
         skip_group(r);
 }
 
-static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
+/* The name of a transformation. */
+static bool is_place(token t)
 {
     static const char place[] = "xformOp:";
+    return t.length >= sizeof place && memcmp(t.at, place, sizeof place - 1) == 0;
+}
+
+static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
+{
     bool half = false;
     const field_id f = field_of(name, &half);
-    const bool is_place = name.length > sizeof place && memcmp(name.at, place, sizeof place - 1) == 0;
     const char *from = r->at;
     if (f == FIELDS || (half && p->fields[f].count > 0)) {
         skip_value(r);
         token value = {.at = r->at};
         reading again = {.file = r->file, .at = from, .end = r->at};
         p->other_place |=
-            is_place && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
+            is_place(name) && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
         return GBT_OK;
     }
     return take_numbers(r, p, f, err);
@@ -222,12 +229,18 @@ static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
     return fail(r, "the text ends inside the prim", err);
 }
 
-/* To the first prim of Gaussians: behind its brace. */
-static gbt_status find_prim(reading *r, gbt_error *err)
+/* To the first prim of Gaussians: behind its brace. `depth`: the number of prims that it is in. */
+static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
 {
     token t;
     bool defined = false;
+    int placed = 0; /* the depth of the outermost of these that has a transformation */
     while (next(r, &t)) {
+        if (is(t, "}"))
+            placed = *depth == placed ? 0 : placed;
+        *depth += is(t, "{") ? 1 : is(t, "}") ? -1 : 0;
+        if (placed == 0 && is_place(t))
+            placed = *depth;
         if (!(defined && is(t, prim_type))) {
             defined = is(t, "def");
             continue;
@@ -235,9 +248,25 @@ static gbt_status find_prim(reading *r, gbt_error *err)
         while (next(r, &t) && !is(t, "{"))
             if (is(t, "("))
                 skip_group(r);
+        p->other_place |= placed != 0;
         return GBT_OK;
     }
     return base_fail(err, GBT_ERR_FORMAT, "%s: has no prim of the type %s", r->file->name, prim_type);
+}
+
+/* Whether a prim that the one before is in has a transformation that stands behind it. */
+static bool placed_behind(reading *r, int depth)
+{
+    token t;
+    for (int inside = 0; depth > 0 && next(r, &t);) {
+        if (is(t, "{"))
+            inside++;
+        else if (is(t, "}"))
+            *(inside > 0 ? &inside : &depth) -= 1;
+        else if (inside == 0 && is_place(t))
+            return true;
+    }
+    return false;
 }
 
 /* ---- Gaussians ---- */
@@ -284,20 +313,25 @@ static void add_gaussian(const prim *p, size_t i, size_t functions, gaussian_clo
 static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error *err)
 {
     size_t functions = 0;
-    GBT_TRY(find_prim(r, err));
+    int depth = 0;
+    GBT_TRY(find_prim(r, p, &depth, err));
     GBT_TRY(read_prim(r, p, err));
+    p->other_place |= placed_behind(r, depth);
     GBT_TRY(check(r, p, &functions, err));
     const size_t count = p->fields[POSITIONS].count / 3;
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
     out->count = 0; /* of those that are usable */
     memcpy(out->origin, p->translate, sizeof out->origin);
+    if (p->fields[NEAR].count == 1)
+        out->near = gaussian_cloud_near((double)p->fields[NEAR].values[0]);
     out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);
     if (p->other_place)
-        log_warn("%s: the prim's rotation and scale are left out; its own coordinates are read, and its "
-                 "translation",
-                 r->file->name);
+        log_warn(
+            "%s: the prim's rotation and scale are left out, and all transformations of the prims that it is "
+            "in; its own coordinates are read, and its translation",
+            r->file->name);
     return out->count > 0 ? GBT_OK
                           : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
                                       r->file->name, out->dropped);

@@ -93,6 +93,8 @@ static gbt_status put_text(sink *s, const gaussian_cloud *cloud, const double or
     put_array(s, "float[] opacities", cloud->opacity, cloud->count, 1);
     sink_put_text(s, "\n");
     put_harmonics(s, cloud);
+    if (cloud->near > 0)
+        put(s, "    custom float " USD_NEAR " = %.9g\n", (double)cloud->near);
     sink_put_text(s, "    uniform token projectionModeHint = \"perspective\"\n"
                      "    uniform token sortingModeHint = \"cameraDistance\"\n"
                      "    float xformOp:rotateZ = 180\n");

@@ -339,6 +339,11 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
     return GBT_OK;
 }
 
+static bool wants_views(const gbt_render_def *def)
+{
+    return def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
+}
+
 static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_error *err)
 {
     GBT_TRY(def_check(def->cookie_, "gbt_render_def_default", err));
@@ -351,6 +356,9 @@ static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_erro
     if (def->camera != NULL && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "downscale: not with a camera (the camera file says the size)");
+    if (def->data != NULL && !wants_views(def))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "data: not with a camera or a path file (they are the cameras)");
     if (def->insert != NULL && def->renderer != GBT_RENDERER_AS_TRAINED &&
         def->renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
@@ -373,23 +381,21 @@ static void folder_of(const char *out, char folder[4096])
 static gbt_status open_run(const char *run, const char *out, const gbt_render_def *def, loaded_run *r,
                            gbt_error *err)
 {
-    const bool wants_views = def->path != NULL ? render_path_wants_views(def->path) : def->camera == NULL;
     char folder[4096];
     bool large = false;
     folder_of(out, folder);
     if (def->memory > 0)
         GBT_TRY(loaded_run_open_cells(run, def->memory, folder, &large, r, err));
     if (large)
-        return wants_views ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
-    return wants_views ? loaded_run_open(run, def->data, def->downscale, r, err)
-                       : loaded_run_open_model(run, r, err);
+        return wants_views(def) ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
+    return wants_views(def) ? loaded_run_open(run, def->data, def->downscale, r, err)
+                            : loaded_run_open_model(run, r, err);
 }
 
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     GBT_TRY(check_def(out, def, err));
-    if (!video_named(out))
-        GBT_TRY(file_make_folder(out, err));
+    GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_make_folder(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
         return GBT_ERR_NO_MEMORY;

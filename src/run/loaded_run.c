@@ -31,6 +31,7 @@ static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *
              (int)sizeof out->model.data_folder - 1, folder.source);
     out->model.iterations = folder.iteration;
     out->def.downscale = folder.downscale;
+    out->picture_width = folder.width;
     out->def.alpha = folder.white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (int c = 0; c < 3; c++)
         out->settings.background[c] = folder.white_background;
@@ -157,6 +158,8 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     if (downscale <= 0)
         downscale = out->def.downscale;
+    if (downscale <= 0 && out->picture_width > 0)
+        downscale = photos_downscale_to(&out->scene, out->picture_width);
     if (downscale <= 0) /* Gaussians of others, whose file says nothing */
         downscale = photos_usual_downscale(&out->scene, true);
     return photos_open(&out->photos, &out->scene, downscale, err);

@@ -21,8 +21,9 @@ typedef struct loaded_run {
     cell_drawer cell_drawer;
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
-    run_data data; /* where its data set is */
-    scene scene;   /* cameras and points in the model's local coordinates */
+    int picture_width; /* of a result folder that says so; then def.downscale is 0. Else 0 */
+    run_data data;     /* where its data set is */
+    scene scene;       /* cameras and points in the model's local coordinates */
     photos photos;
     trace_settings settings;
     frame frame;

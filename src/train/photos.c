@@ -22,7 +22,7 @@ static double median(float *values, size_t count)
     return (double)values[count / 2];
 }
 
-double photos_usual_downscale(const scene *s, bool limits_width)
+double photos_downscale_to(const scene *s, double width)
 {
     float *widths = mem_alloc(2 * s->view_count + 1, sizeof *widths, "photo widths", NULL);
     if (widths == NULL || s->view_count == 0) {
@@ -38,9 +38,14 @@ double photos_usual_downscale(const scene *s, bool limits_width)
         widths[i] = (float)(is_smaller ? h.width : view->camera.width);
         ratios[i] = (float)view->camera.width / widths[i];
     }
-    const double width = median(widths, s->view_count), ratio = median(ratios, s->view_count);
+    const double is = median(widths, s->view_count), ratio = median(ratios, s->view_count);
     mem_free(widths);
-    return ratio * (limits_width ? fmax(1, width / USUAL_WIDTH) : 1);
+    return ratio * fmax(1, is / width);
+}
+
+double photos_usual_downscale(const scene *s, bool limits_width)
+{
+    return photos_downscale_to(s, limits_width ? USUAL_WIDTH : HUGE_VAL);
 }
 
 /* Nothing but time depends on it. */

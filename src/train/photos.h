@@ -37,8 +37,11 @@ typedef struct photo_sample {
     const float *backdrop; /* [3]: a colour behind what is transparent; NULL: that of scene_view.alpha */
 } photo_sample;
 
-/** By which the cameras of a scene are divided where nobody says: to the size of their photos if these are
-    smaller, and if `limits_width` the median one to 1,600 pixels, if it is wider. Cost: opens every photo. */
+/** By which the cameras of a scene are divided so that the median photo has this width: to the size of their
+    photos if these are smaller than they, and further if it is wider. Cost: opens every photo. */
+double photos_downscale_to(const scene *s, double width);
+
+/** The same where nobody says a width: 1,600 pixels if `limits_width`, else as wide as it is. */
 double photos_usual_downscale(const scene *s, bool limits_width);
 
 /** `downscale` 0 is 1. */

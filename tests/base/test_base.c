@@ -285,6 +285,38 @@ static void failed_writes_leave_nothing(void **state)
     remove_entries(folder);
 }
 
+/* What a write would say, before there is anything to write. */
+static void places_are_looked_at(void **state)
+{
+    (void)state;
+    char path[512], inner[600];
+    gbt_error err = {0};
+    assert_ok(file_join(path, sizeof path, folder, "there", NULL));
+    assert_ok(file_check_creatable(path, NULL));
+    assert_ok(file_check_folder_creatable(path, NULL));
+    assert_ok(file_join(inner, sizeof inner, path, "a/", NULL));
+    assert_ok(file_check_folder_creatable(inner, NULL));
+    assert_int_equal(file_check_creatable(inner, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "there/a/: cannot create: No such file or directory"));
+    assert_int_equal(entry_count(folder), 0);
+    assert_ok(file_check_creatable("x", NULL)); /* here */
+    assert_ok(file_check_folder_creatable("x/y", NULL));
+    assert_ok(file_write_atomic(path, "x", 1, NULL));
+    assert_ok(file_check_creatable(path, NULL)); /* is replaced */
+    err = (gbt_error){0};
+    assert_int_equal(file_check_folder_creatable(inner, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "cannot create: Not a directory"));
+    err = (gbt_error){0};
+    assert_int_equal(file_check_creatable(folder, &err), GBT_ERR_IO);
+    assert_non_null(strstr(err.text, "cannot create: Is a directory"));
+    if (geteuid() != 0) { /* who may write everywhere */
+        assert_int_equal(chmod(folder, 0555), 0);
+        assert_int_equal(file_check_creatable(path, NULL), GBT_ERR_IO);
+        assert_int_equal(chmod(folder, 0755), 0);
+    }
+    remove_entries(folder);
+}
+
 /* A write that stops half-way (here at a file size limit) leaves the old file whole and no temporary one. */
 static void full_disk_keeps_the_old_file(void **state)
 {
@@ -624,6 +656,7 @@ int main(void)
         cmocka_unit_test(random_numbers_have_their_moments),
         cmocka_unit_test(files_come_back),
         cmocka_unit_test(failed_writes_leave_nothing),
+        cmocka_unit_test(places_are_looked_at),
         cmocka_unit_test(full_disk_keeps_the_old_file),
         cmocka_unit_test(reads_refuse_what_is_no_file),
         cmocka_unit_test(ends_tell_files_apart),

@@ -152,6 +152,13 @@ misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use 
 misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
 misuse 2 "--position_lr_init: not here; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
 misuse 4 "nothing: not a run folder (wanted what gbtrace train wrote)" metrics -m nothing
+# Where results go is looked at before anything else.
+misuse 4 "nowhere/x.ply: cannot create: No such file or directory" export nothing x.ply nowhere/x.ply
+misuse 4 "good.conf/x/: cannot create: Not a directory" export nothing good.conf/x/
+misuse 4 "nowhere/x.json: cannot create: No such file or directory" export nothing x.ply --json nowhere/x.json
+misuse 4 "nowhere/x.gbt: cannot create: No such file or directory" compress nothing -o nowhere/x.gbt
+misuse 4 "nowhere/x.json: cannot create: No such file or directory" compress nothing -o x.gbt --json nowhere/x.json
+misuse 4 "nowhere/x.mp4: cannot create: No such file or directory" render nothing -o nowhere/x.mp4 --path orbit
 misuse 2 "--output is missing (usage: gbtrace render RUN|GAUSSIANS [-o DIR])" render -m nothing
 misuse 2 "--iteration: not here; a run keeps its last model alone" render -m nothing --iteration 7000
 
@@ -295,6 +302,9 @@ misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o -
 misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
+for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--path orbit" "--preset fast" "--renderer raster"; do
+    misuse 2 "--output is missing (with --data, --downscale, --format, --insert, --path, --preset or --renderer nothing goes into tiny/renders)" render tiny $other
+done
 misuse 2 "--outputs: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
 misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
 for bad in 20x10x5 -3x4; do
@@ -509,10 +519,18 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         "$program" info all.$ending && "$program" export all.$ending again.ply || break
     done >>out 2>>err && [ "$(grep -c "gaussians $(sed -n 's/^  "gaussians": \([0-9]*\),$/\1/p' plain.json)," out)" = 5 ]
     report $? "every small format is written, looked into and converted" "$(cat err out)"
+    "$program" export run $("$program" export --help | sed -n 's,^  \(\.[a-z0-9.]*\) .*,each\1,p') each/ --refine 0 >out 2>err && [ "$(grep -c 'dB to the model' out)" = 10 ]
+    report $? "one export has room for all formats and the result folder" "$(cat err out)"
+    misuse 2 "plain.ply: 17 files to write (wanted 1 to 16)" export plain.ply $(seq -f %g.ply 16) -o 17.ply
     "$program" export run thin.sog --gaussians 1010 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1010,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
         grep -q ' that are blended least' out
     report $? "export keeps the Gaussians that are blended most" "$(cat err out)"
     misuse 2 "--gaussians: 10 of plain.ply (wanted 0 or more, and a trained model)" export plain.ply o.ply --gaussians 10
+    misuse 2 "--refine: 3 of plain.ply (wanted a trained model)" export plain.ply o.ply --refine 3
+    misuse 2 "--no-backdrop: not for plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
+    misuse 2 "--data: not for plain.ply (wanted a trained model)" export plain.ply o.ply --data made
+    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --camera x.json
+    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --path x.json
     misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000
     for file in plain.ply plain.splat plain.spz plain.glb; do
         prints "info of $file" "^$file: plain Gaussians$" info $file

@@ -62,13 +62,38 @@ report $? "a result folder within a memory limit" "$(cat err out)"
 sed -i 's/resolution=1/resolution=2/' result/cfg_args && "$program" render result -o half --format exr >out 2>err && "$program" render result -o asked --format exr -d 1 >>out 2>>err &&
     "$program" compare whole/*0.exr asked/*0.exr >>out 2>>err && ! "$program" compare whole/*0.exr half/*0.exr >>out 2>>err && grep -q '16 x 12' err
 report $? "a result folder of photos at half size" "$(cat err out)"
+"$program" train made -o three-quarters --iterations 3 --downscale 1.33333 --quiet >out 2>err && "$program" export three-quarters narrow/ --refine 0 >>out 2>>err &&
+    grep -q 'resolution=24, ' narrow/cfg_args && grep -q '"width": 24,' narrow/cameras.json && "$program" render narrow -o narrow-drawn >>out 2>>err &&
+    "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png --json | grep -q '"width": 24, "height": 18, "psnr": 100,'
+report $? "a result folder of photos at another width" "$(cat err out; cat narrow/cfg_args; "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png)"
 "$program" export run plain.ply >out 2>err && "$program" make-scene tabletop -o wide --width 1920 --height 12 --views 3 --points 20 --samples 1 --quiet >>out 2>>err && "$program" render plain.ply -o usual --data wide >>out 2>>err &&
     "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
     grep -q '1600 x 10' err && grep -q '1920 x 12' err
 report $? "wide photos of plain Gaussians" "$(cat err out)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
+mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,0.3],[0,0,0,1]]}' "$1" "$2"; }
+printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 0.8)" "$(frame 0001 -0.8)" >close/transforms.json
+"$program" export run n.ply n.glb n.sog n.usda n.spz n.splat near/ --data close --refine 0 >out 2>err && "$program" render run -o near-model --data close >>err 2>&1
+for file in n.ply n.glb n.sog n.usda n.spz n.splat near; do
+    "$program" render "$file" -o near-drawn --data close >>err 2>&1 && "$program" compare near-drawn/*.png near-model/*.png --json |
+        awk -v file="$file" -F '[:,]' '{for (i = 1; i < NF; i++) if ($i ~ /"psnr"/) printf "^%s/*: .* 1 held-out views: %.2f dB to the model", file, $(i + 1)}' >pattern && grep -q -f pattern out || { cat pattern; break; }
+done >wrong 2>&1 && [ ! -s wrong ] && [ "$(grep -c '^warning: .*does not keep the near distance' err)" = 2 ] && grep -q '^warning: n.spz: the format does not keep the near distance (0\.53[0-9]*), with which' err
+report $? "the printed scores are those of the files, with their near distance or without" "$(cat wrong err out)"
 holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
+
+prim='def ParticleField3DGaussianSplat "one" { point3f[] positions = [(1, 2, 3)] quatf[] orientations = [(1, 0, 0, 0)] float[] opacities = [0.5] float3[] scales = [(1, 1, 1)]'
+moved='double3 xformOp:translate = (9, 0, 0) uniform token[] xformOpOrder = ["xformOp:translate"]'
+usd() { # NAME WARNINGS TEXT
+    printf '#usda 1.0\n%s\n' "$3" >one.usda
+    "$program" export one.usda one.ply >out 2>err && [ "$(grep -c '^warning: one.usda: the prim.s rotation and scale are left out, and all transformations of the prims that it is in;' err)" = "$2" ]
+    report $? "USD: $1" "$(cat err out)"
+}
+usd "a prim alone, with a translation" 0 "$prim $moved }"
+usd "a prim that is turned" 1 "$prim float xformOp:rotateY = 90 }"
+usd "a prim in one that is moved" 1 "def Xform \"all\" { $moved def Scope \"some\" { $prim } } }"
+usd "a prim in one that says so behind it" 1 "def Xform \"all\" { def Scope \"some\" { $prim } } $moved }"
+usd "a prim in one that is not moved, beside some that are" 0 "def Xform \"all\" { def Xform \"a\" { $moved } $prim } def Xform \"b\" { $moved } } def Xform \"c\" { $moved }"
 
 # ---- counts and places
 "$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]

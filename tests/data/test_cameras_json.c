@@ -82,10 +82,11 @@ static void newest_iteration(void **state)
     static const char *const resolutions[] = {"resolution=4, ", "resolution=-1, ", "resolution=1200, ",
                                               "resolution=1)"};
     static const double downscales[] = {4, 0, 0, 1};
+    static const int widths[] = {0, 0, 1200, 0};
     for (int i = 0; i < 4; i++) {
         write_text(folder, "cfg_args", resolutions[i]);
         must(result_folder_find(folder, &found, &is_there, &err));
-        assert_true(found.downscale == downscales[i]);
+        assert_true(found.downscale == downscales[i] && found.width == widths[i]);
     }
     assert_true(gaussian_file_readable(folder) && gaussian_file_has_gaussians(folder));
     gaussian_cloud cloud;

@@ -53,6 +53,27 @@ static void ply_says_how_it_is_drawn(void **state)
     gaussian_cloud_free(&b);
 }
 
+/* The near distance, in every format but those that have no place for it; also one that is read and written
+   again. */
+static void near_distances_are_kept(void **state)
+{
+    static const char *const names[] = {"n.ply", "n.compressed.ply", "n.sog",  "n.glb", "n.usda", "n.usdz",
+                                        "n.spz", "n.v4.spz",         "n.splat"};
+    gaussian_cloud a, b;
+    make_cloud(&a, 20, 1);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        for (int said = 0; said < 2; said++) {
+            a.near = said == 1 ? 4.90744f : 0;
+            must(gaussian_file_write(inside(*state, names[i], 0), &a, nowhere, &err));
+            must(gaussian_file_read(inside(*state, names[i], 0), &b, &err));
+            assert_true(b.near == (i < 6 ? a.near : 0));
+            gaussian_cloud_free(&b);
+        }
+    gaussian_cloud_free(&a);
+    assert_true(gaussian_cloud_near(0.5) == 0.5f && gaussian_cloud_near(-1) == 0 &&
+                gaussian_cloud_near((double)NAN) == 0 && gaussian_cloud_near((double)INFINITY) == 0);
+}
+
 static void spz_keeps_its_steps(void **state)
 {
     for (int degree = 0; degree <= 3; degree++) {
@@ -361,6 +382,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(ply_keeps_everything, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(ply_says_how_it_is_drawn, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(near_distances_are_kept, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),

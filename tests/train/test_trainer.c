@@ -1456,6 +1456,7 @@ static void wide_photos_get_a_usual_width(void **state)
         {.camera = {.width = 800}}, {.camera = {.width = 4000}}, {.camera = {.width = 3200}}};
     const scene s = {.views = views, .view_count = 3};
     assert_true(photos_usual_downscale(&s, true) == 2 && photos_usual_downscale(&s, false) == 1);
+    assert_true(photos_downscale_to(&s, 2400) == 3200.0 / 2400 && photos_downscale_to(&s, 4000) == 1);
     views[1].camera.width = 1600;
     assert_true(photos_usual_downscale(&s, true) == 1);
     views[2].camera.width = 100;

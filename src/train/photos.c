@@ -13,8 +13,9 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "data/photo_size.h"
+#include "train/photo_pick.h"
 
-enum { PICK_ROWS = 32 /* of one thread at a time */, USUAL_WIDTH = 1600 /* as in 3DGS */ };
+enum { USUAL_WIDTH = 1600 /* as in 3DGS */ };
 
 static double median(float *values, size_t count)
 {
@@ -120,47 +121,9 @@ static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
     return GBT_OK;
 }
 
-/* Every `step`-th pixel of every `step`-th row, from pixel `first` on; rows have `row` pixels. */
-typedef struct pick_job {
-    const unsigned char *from, *through; /* through NULL: opaque, or to stay as it is */
-    float change[3];                     /* of the colour behind what is transparent */
-    size_t first, row, step;
-    image *out;
-} pick_job;
-
-static void lay_on(const pick_job *job, const unsigned char *through, float *to)
-{
-    for (size_t x = 0; x < (size_t)job->out->width; x++)
-        for (size_t c = 0; c < 3; c++)
-            to[3 * x + c] += (float)through[x * job->step] * (1.0f / 255) * job->change[c];
-}
-
-static void pick_rows(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const pick_job *job = context;
-    const size_t width = (size_t)job->out->width, stride = 3 * job->step;
-    for (size_t y = begin; y < end; y++) {
-        const size_t first = job->first + y * job->step * job->row;
-        const unsigned char *from = job->from + 3 * first;
-        float *to = job->out->pixels + 3 * y * width;
-        if (job->step == 1) { /* one run, of which the compiler makes vectors */
-            for (size_t i = 0; i < 3 * width; i++)
-                to[i] = (float)from[i] * (1.0f / 255);
-        } else {
-            for (size_t x = 0; x < width; x++)
-                for (size_t c = 0; c < 3; c++)
-                    to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
-        }
-        if (job->through != NULL)
-            lay_on(job, job->through + first, to);
-    }
-}
-
 static void from_bytes(const unsigned char *bytes, image *out)
 {
-    pick_job job = {.from = bytes, .row = (size_t)out->width, .step = 1, .out = out};
-    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
+    photo_pick_pixels(bytes, out->width, &(photo_pick){.step = 1}, NULL, NULL, out);
 }
 
 static size_t full_bytes(const photos *p, size_t view)
@@ -374,112 +337,4 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->pixels[view], out);
     return GBT_OK;
-}
-
-/* The pixels of a photo that are picked: where the first is, how far apart they are, and how many. */
-typedef struct pick {
-    int first[2], step, width, height;
-} pick;
-
-/* The marks of picked pixels, if the photo has any. */
-static gbt_status pick_valid(photos *p, size_t view, int full_width, const pick *from,
-                             const unsigned char **valid, gbt_error *err)
-{
-    const unsigned char *full = p->full_valid[view];
-    *valid = NULL;
-    if (full == NULL)
-        return GBT_OK;
-    const size_t w = (size_t)from->width, h = (size_t)from->height, step = (size_t)from->step;
-    GBT_TRY(
-        mem_reserve((void **)&p->sample_valid, &p->sample_valid_capacity, 0, w * h, 1, "valid pixels", err));
-    for (size_t y = 0; y < h; y++)
-        for (size_t x = 0; x < w; x++)
-            p->sample_valid[y * w + x] = full[(y * step + (size_t)from->first[1]) * (size_t)full_width +
-                                              x * step + (size_t)from->first[0]];
-    *valid = p->sample_valid;
-    return GBT_OK;
-}
-
-/* One of `parts` along a length: all are as long, the first and the last reach its ends. */
-static int part_first(int length, int part_length, int part, int parts)
-{
-    return (int)((int64_t)(length - part_length) * part / (parts - 1));
-}
-
-/* The camera of picked pixels; false where the lens cannot be shifted. */
-static bool pick_camera(const gbt_camera *full, const photo_sample *sample, pick *from, gbt_camera *camera)
-{
-    if (sample->level > 0) {
-        *from = (pick){.first = {sample->phase[0], sample->phase[1]}, .step = 1 << sample->level};
-        if (!gbt_camera_every(full, from->step, from->first[0], from->first[1], camera))
-            return false;
-        from->width = camera->width;
-        from->height = camera->height;
-        return true;
-    }
-    const int parts = sample->parts, width = (full->width + parts - 1) / parts,
-              height = (full->height + parts - 1) / parts;
-    *from = (pick){.first = {part_first(full->width, width, sample->part[0], parts),
-                             part_first(full->height, height, sample->part[1], parts)},
-                   .step = 1,
-                   .width = width,
-                   .height = height};
-    return gbt_camera_cropped(full, from->first[0], from->first[1], width, height, camera);
-}
-
-/* Pixels of p->full. */
-static void pick_pixels(const photos *p, size_t view, int full_width, const pick *from, const float *backdrop,
-                        image *out)
-{
-    pick_job job = {.from = p->full[view],
-                    .through = backdrop != NULL ? p->through[view] : NULL,
-                    .first = (size_t)from->first[1] * (size_t)full_width + (size_t)from->first[0],
-                    .row = (size_t)full_width,
-                    .step = (size_t)from->step,
-                    .out = out};
-    const float behind = p->source->views[view].alpha == SCENE_ALPHA_WHITE;
-    for (int c = 0; c < 3 && backdrop != NULL; c++)
-        job.change[c] = backdrop[c] - behind;
-    parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
-}
-
-/* A whole photo at a level, on a colour of its own: made anew each time. */
-static gbt_status get_laid_on(photos *p, size_t view, int level, const float *backdrop, image *out,
-                              gbt_error *err)
-{
-    const gbt_camera full = photos_camera(p, view, 0), camera = photos_camera(p, view, level);
-    GBT_TRY(photos_read_full(p, view, err));
-    if (p->through[view] == NULL)
-        return GBT_OK;
-    image whole = {0};
-    GBT_TRY(image_fit(&whole, full.width, full.height, 3, err));
-    pick_pixels(p, view, full.width, &(pick){.step = 1}, backdrop, &whole);
-    image_free(out);
-    if (level == 0) {
-        *out = whole;
-        return GBT_OK;
-    }
-    const gbt_status status = photo_resize(&whole, camera.width, camera.height, out, err);
-    image_free(&whole);
-    return status;
-}
-
-gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
-                             gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err)
-{
-    const gbt_camera full = photos_camera(p, view, 0);
-    pick from;
-    if ((sample->level == 0 && sample->parts <= 1) || !pick_camera(&full, sample, &from, camera)) {
-        *camera = photos_camera(p, view, sample->level);
-        *step = 1;
-        GBT_TRY(photos_get(p, view, sample->level, out, err));
-        *valid = photos_valid(p, view);
-        return sample->backdrop != NULL ? get_laid_on(p, view, sample->level, sample->backdrop, out, err)
-                                        : GBT_OK;
-    }
-    *step = from.step;
-    GBT_TRY(photos_read_full(p, view, err));
-    GBT_TRY(image_fit(out, from.width, from.height, 3, err));
-    pick_pixels(p, view, full.width, &from, sample->backdrop, out);
-    return pick_valid(p, view, full.width, &from, valid, err);
 }

@@ -13,7 +13,7 @@ enum { SANITIZED = 0 };
 #endif
 
 enum { POINTS = 160000 };
-static const size_t limit = (size_t)220 << 20;
+static const size_t limit = (size_t)185 << 20;
 
 static int make_large_scene(void *folder)
 {

@@ -38,7 +38,7 @@ static size_t round_up(size_t count, size_t multiple) { return (count + multiple
 static void decide_rows(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
-    const size_t rows = end - begin, tiled = round_up(rows, DECODE_TILE), offsets = job->layout.offset_count;
+    const size_t rows = end - begin, tiled = decode_tiled(rows), offsets = job->layout.offset_count;
     float *alpha = tape->alpha + begin * offsets;
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * ANCHOR_HIDDEN_DIM],
         logits[DECODE_CHUNK * ALPHA_STRIDE];
@@ -124,23 +124,21 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     return g - first;
 }
 
-static float larger(float a, float b) { return a > b ? a : b; }
-
 FASTEST_CLONE static void hold_ratio(float *const scale[3], size_t count)
 {
     float *restrict x = scale[0], *restrict y = scale[1], *restrict z = scale[2];
     for (size_t i = 0; i < count; i++) {
-        const float least = DECODE_SCALE_RATIO * larger(x[i], larger(y[i], z[i]));
-        x[i] = larger(x[i], least);
-        y[i] = larger(y[i], least);
-        z[i] = larger(z[i], least);
+        const float least = DECODE_SCALE_RATIO * decode_larger(x[i], decode_larger(y[i], z[i]));
+        x[i] = decode_larger(x[i], least);
+        y[i] = decode_larger(y[i], least);
+        z[i] = decode_larger(z[i], least);
     }
 }
 
 static void emit_rows(const forward_job *job, size_t begin)
 {
     decode_tape *tape = job->tape;
-    const size_t rows = tape->filled[begin / DECODE_CHUNK], tiled = round_up(rows, DECODE_TILE);
+    const size_t rows = tape->filled[begin / DECODE_CHUNK], tiled = decode_tiled(rows);
     const uint32_t *row = tape->row + begin;
     enum { HIDDEN = (HEAD_COUNT - 1) * ANCHOR_HIDDEN_DIM };
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN],
@@ -205,7 +203,7 @@ static void emit_block(size_t block, size_t begin, size_t end, void *context)
 
 static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_error *err)
 {
-    const size_t rows = round_up(visible_count, DECODE_TILE);
+    const size_t rows = decode_tiled(visible_count);
     const size_t chunks = parallel_block_count(visible_count, DECODE_CHUNK);
     GBT_TRY(mem_reserve((void **)&tape->first, &tape->first_capacity, 0, chunks + 1, sizeof *tape->first,
                         "decode tape", err));
@@ -215,7 +213,7 @@ static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_erro
                         err));
     if (rows <= tape->capacity && tape->alpha != NULL)
         return GBT_OK;
-    const size_t capacity = round_up(rows + rows / 4, DECODE_TILE);
+    const size_t capacity = decode_tiled(rows + rows / 4);
     float *block = /* one owner (alpha), two arrays */
         mem_alloc(capacity, (ALPHA_STRIDE + 1) * sizeof *block, "decode tape", err);
     if (block == NULL)

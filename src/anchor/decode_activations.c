@@ -21,8 +21,6 @@ typedef struct batch_out {
     float offset[3][BATCH], scale_log[6][BATCH], alpha[BATCH], shape[SHAPE_OUTPUTS][BATCH], color[3][BATCH];
 } batch_out;
 
-static float larger(float a, float b) { return a > b ? a : b; }
-
 /* Means and offsets. */
 FASTEST_CLONE static void back_means(const batch_in *restrict in, const gaussians *d, size_t g, size_t count,
                                      batch_out *restrict out)
@@ -52,7 +50,8 @@ FASTEST_CLONE static void back_scales(const batch_in *restrict in, const float *
             scale[c][i] = in->extent[3 + c][i] * kept[(size_t)(KEPT_SIGMOID + c) * stride + i];
     }
     for (size_t i = 0; i < count; i++) {
-        const float x = scale[0][i], y = scale[1][i], z = scale[2][i], most = larger(x, larger(y, z));
+        const float x = scale[0][i], y = scale[1][i], z = scale[2][i],
+                    most = decode_larger(x, decode_larger(y, z));
         largest[i] = most;
         least[i] = DECODE_SCALE_RATIO * most;
         const float from_x = x < least[i] ? slope[0][i] : 0.0f, from_y = y < least[i] ? slope[1][i] : 0.0f,

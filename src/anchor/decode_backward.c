@@ -151,7 +151,7 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
                            double *d_camera)
 {
     const decode_tape *tape = job->tape;
-    const size_t chunk = begin / DECODE_CHUNK, tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
+    const size_t chunk = begin / DECODE_CHUNK, tiled = decode_tiled(rows);
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN_STRIDE],
         d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_out[DECODE_CHUNK * OUT_WIDTH_MAX],
         d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM], extent[DECODE_CHUNK * 6], d_scale_log[DECODE_CHUNK * 6];

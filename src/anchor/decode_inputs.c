@@ -44,8 +44,7 @@ FASTEST_CLONE void decode_inputs(const anchors *a, const decoder *d, const float
         for (int i = INPUT_ONE + 1; i < INPUT_STRIDE; i++)
             row[i] = 0.0f;
     }
-    const size_t tiled = (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
-    memset(input + rows * INPUT_STRIDE, 0, (tiled - rows) * INPUT_STRIDE * sizeof *input);
+    memset(input + rows * INPUT_STRIDE, 0, (decode_tiled(rows) - rows) * INPUT_STRIDE * sizeof *input);
 }
 
 void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,

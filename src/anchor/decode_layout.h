@@ -57,6 +57,14 @@ typedef struct decode_layout {
 
 decode_layout decode_layout_of(const decoder *d);
 
+/** Rows rounded up to whole register tiles. */
+static inline size_t decode_tiled(size_t rows)
+{
+    return (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
+}
+
+static inline float decode_larger(float a, float b) { return a > b ? a : b; }
+
 /** The networks as the kernels read them; every array points into one block. */
 typedef struct decode_weights {
     float *input_hidden;           /* [INPUT_COUNT][HIDDEN_STRIDE] */

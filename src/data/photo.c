@@ -57,8 +57,24 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
         view->camera.width, view->camera.height, stored->width, stored->height);
 }
 
+/* How transparent a stored photo is, at another size; `out` stays empty where nothing is. */
+static gbt_status read_through(const image *stored, scene_alpha kind, int width, int height, image *out,
+                               gbt_error *err)
+{
+    if (stored->channels < 4 || kind == SCENE_ALPHA_MASK)
+        return GBT_OK;
+    image at_stored;
+    GBT_TRY(image_alloc(&at_stored, stored->width, stored->height, 1, err));
+    for (size_t i = 0; i < (size_t)stored->width * (size_t)stored->height; i++)
+        at_stored.pixels[i] = 1 - fminf(fmaxf(stored->pixels[4 * i + 3], 0), 1);
+    const gbt_status status = photo_resize(&at_stored, width, height, out, err);
+    image_free(&at_stored);
+    return status;
+}
+
+/* `valid` and `through` are optional. */
 static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid,
-                             gbt_error *err)
+                             image *through, gbt_error *err)
 {
     image stored = {0}, rgb = {0};
     memset(out, 0, sizeof *out);
@@ -73,6 +89,8 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
         status = is_premultiplied(view->path, &stored, &premultiplied, err);
     if (status == GBT_OK)
         status = to_rgb(&stored, view->alpha, premultiplied, &rgb, err);
+    if (status == GBT_OK && through != NULL)
+        status = read_through(&stored, view->alpha, width, height, through, err);
     image_free(&stored);
     if (status == GBT_OK && rgb.width == width && rgb.height == height) {
         *out = rgb;
@@ -93,17 +111,33 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
 
 gbt_status scene_read_photo(const scene_view *view, int width, int height, image *out, gbt_error *err)
 {
-    return read_photo(view, width, height, out, NULL, err);
+    return read_photo(view, width, height, out, NULL, NULL, err);
+}
+
+static gbt_status read_whole(const scene_view *view, int width, int height, image *out, unsigned char **valid,
+                             image *through, gbt_error *err)
+{
+    *valid = NULL;
+    const gbt_status status = read_photo(view, width, height, out, valid, through, err);
+    if (status != GBT_OK) {
+        mem_free(*valid);
+        *valid = NULL;
+    }
+    return status;
 }
 
 gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out,
                                   unsigned char **valid, gbt_error *err)
 {
-    *valid = NULL;
-    const gbt_status status = read_photo(view, width, height, out, valid, err);
-    if (status != GBT_OK) {
-        mem_free(*valid);
-        *valid = NULL;
-    }
+    return read_whole(view, width, height, out, valid, NULL, err);
+}
+
+gbt_status scene_read_photo_through(const scene_view *view, int width, int height, image *out,
+                                    unsigned char **valid, image *through, gbt_error *err)
+{
+    *through = (image){0};
+    const gbt_status status = read_whole(view, width, height, out, valid, through, err);
+    if (status != GBT_OK)
+        image_free(through);
     return status;
 }

@@ -107,16 +107,14 @@ gbt_camera photos_camera(const photos *p, size_t view, int level)
     return photo_camera_divided(&p->source->views[view].camera, ldexp(p->downscale, level));
 }
 
-static unsigned char to_byte(float x) { return (unsigned char)(fminf(fmaxf(x, 0.0f), 1.0f) * 255 + 0.5f); }
-
 static gbt_status to_bytes(const image *im, unsigned char **out, gbt_error *err)
 {
-    const size_t count = (size_t)im->width * (size_t)im->height * 3;
+    const size_t count = (size_t)im->width * (size_t)im->height * (size_t)im->channels;
     unsigned char *bytes = mem_alloc(count, 1, "photo", err);
     if (bytes == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < count; i++)
-        bytes[i] = to_byte(im->pixels[i]);
+        bytes[i] = (unsigned char)(fminf(fmaxf(im->pixels[i], 0.0f), 1.0f) * 255 + 0.5f);
     *out = bytes;
     return GBT_OK;
 }
@@ -149,37 +147,18 @@ static void drop_passing(photos *p)
     p->passing = SIZE_MAX;
 }
 
-/* Into p->through, of a photo that lies on black or white: on the other it differs by just that. */
-static gbt_status find_through(photos *p, size_t view, const image *photo, gbt_error *err)
-{
-    scene_view other = p->source->views[view];
-    int width, height, channels;
-    if (other.alpha == SCENE_ALPHA_MASK ||
-        image_probe(other.path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
-        return GBT_OK;
-    other.alpha = other.alpha == SCENE_ALPHA_WHITE ? SCENE_ALPHA_BLACK : SCENE_ALPHA_WHITE;
-    image changed;
-    GBT_TRY(scene_read_photo(&other, photo->width, photo->height, &changed, err));
-    const size_t count = (size_t)photo->width * (size_t)photo->height;
-    unsigned char *through = mem_alloc(count, 1, "photo", err);
-    for (size_t i = 0; through != NULL && i < count; i++)
-        through[i] = to_byte(fabsf(changed.pixels[3 * i] - photo->pixels[3 * i]));
-    image_free(&changed);
-    p->through[view] = through;
-    return through != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
-}
-
-/* Into p->full. */
+/* Into p->full, and what goes with it. */
 static gbt_status read_into(photos *p, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
-    image photo;
-    GBT_TRY(scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo,
-                                   &p->full_valid[view], err));
-    gbt_status status = find_through(p, view, &photo, err);
-    if (status == GBT_OK)
-        status = to_bytes(&photo, &p->full[view], err);
+    image photo, through;
+    GBT_TRY(scene_read_photo_through(&p->source->views[view], camera.width, camera.height, &photo,
+                                     &p->full_valid[view], &through, err));
+    gbt_status status = to_bytes(&photo, &p->full[view], err);
+    if (status == GBT_OK && through.pixels != NULL)
+        status = to_bytes(&through, &p->through[view], err);
     image_free(&photo);
+    image_free(&through);
     if (status != GBT_OK)
         drop_full(p, view);
     return status;

@@ -98,10 +98,12 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
         counters->tests += (uint64_t)take * PACKET_LANES;
         queue.count -= take;
         memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
-        /* What lies behind all hits of a ray that is opaque is not seen. */
-        sight.far = vfloat16_select(
-            vfloat16_lt(sight.product, opaque),
-            vfloat16_min(sight.far, vfloat16_mul(sight.reached, vfloat16_set1(1.000001f))), sight.far);
+        /* What lies behind all hits of a ray that is opaque is not seen; at their depth, which is 0 where
+           they are cut there, it still may be. */
+        const vfloat16 behind =
+            vfloat16_max(vfloat16_mul(sight.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
+        sight.far =
+            vfloat16_select(vfloat16_lt(sight.product, opaque), vfloat16_min(sight.far, behind), sight.far);
         /* Those that still wait are of this sixteen. */
         const float nearest = list->nearest[first / 16 + (queue.count == 0)];
         if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), sight.far)))

@@ -9,6 +9,7 @@
 #include "data/gaussian_ply.h"
 #include "test_support.h"
 #include "trace/fixture.h"
+#include "trace/random_scene.h"
 #include "reference_once.h"
 #include "trace/trace.h"
 
@@ -629,6 +630,28 @@ static void coincident_gaussians(void **state)
     }
 }
 
+/* The camera inside of many that hide each other, and no near depth: most hits are at depth 0, where they go
+   by index, and one found late may come first. */
+static void inside_of_many(void **state)
+{
+    (void)state;
+    gaussians g = random_gaussians(200, 0.3f, 21);
+    for (size_t i = 0; i < g.count; i++) {
+        g.scale_x[i] = 2 + g.scale_x[i];
+        g.scale_y[i] = 2 + g.scale_y[i];
+        g.scale_z[i] = 2 + g.scale_z[i];
+    }
+    trace_settings s = with_background();
+    s.t_near = 0;
+    const gbt_camera camera = camera_at((double[3]){4, 0.5, 0}, (double[3]){5, 0, 2}, 20, 18, 20);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const figures f = compare(&g, &s, &rays, 61, 1e-6);
+    assert_figures("inside of many", &f, 1e-5);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 /* A sheet across the depths, whose near part is blended rounds before its far part is reached, and a wall in
    front of the far part alone: the rays of that part become opaque while the sheet waits for them. What was
    blended must still reach the adjoint. */
@@ -1041,6 +1064,7 @@ int main(void)
         cmocka_unit_test(rays_that_do_not_run_together),
         cmocka_unit_test(one_hundred_thousand_hits),
         cmocka_unit_test(coincident_gaussians),
+        cmocka_unit_test(inside_of_many),
         cmocka_unit_test(sheets_that_end_behind_a_wall),
         cmocka_unit_test(the_cap_is_exact),
         cmocka_unit_test(instruction_sets_and_threads_give_the_same_bits),

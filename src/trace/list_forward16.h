@@ -187,7 +187,7 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         counters->rays += (uint64_t)__builtin_popcount(packet->active);
         slope_rays(part_frame(view, part), packet, middle, &seen);
         gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
-        order_by_middle(&list, scene->settings.t_near, &rows);
+        order_by_middle(scene, &list, &rows);
         if (scene->settings.packet_order)
             append_rows(&rows);
         else

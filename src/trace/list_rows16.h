@@ -156,9 +156,44 @@ static void rank_rows(float *key, size_t count, uint32_t *order)
     }
 }
 
+static inline const list_row *row_at(const tile_list *list, const list_rows *rows, size_t place)
+{
+    return &list->row[rows->number[rows->order[place]]];
+}
+
+/* `count` rows from place `first` on, by index. Sorted in arrays that are not yet set. */
+static void order_by_index(const tile_list *list, list_rows *rows, size_t first, size_t count)
+{
+    uint32_t *sorted = (uint32_t *)(void *)(rows->through + count);
+    for (size_t i = 0; i < count; i++)
+        memcpy(&rows->through[i], &row_at(list, rows, first + i)->id, sizeof(uint32_t));
+    const uint64_t *order =
+        sort_list(rows->through, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
+    for (size_t i = 0; i < count; i++)
+        sorted[i] = rows->order[first + (uint32_t)order[i]];
+    memcpy(rows->order + first, sorted, count * sizeof *sorted);
+}
+
+/* Gaussians of one shape in one place are at one depth on all rays, however opaque each is: by index. */
+static void order_copies(const kernel_scene *scene, const tile_list *list, list_rows *rows)
+{
+    const size_t shape = RECORD_OPACITY * sizeof(float); /* what stands before it in a record */
+    for (size_t first = 0, end; first < rows->count; first = end) {
+        const float key = rows->key[rows->order[first]];
+        for (end = first + 1; end < rows->count && rows->key[rows->order[end]] == key; end++) {
+            const float *a = scene->records + (size_t)row_at(list, rows, first)->id * RECORD_FLOATS,
+                        *b = scene->records + (size_t)row_at(list, rows, end)->id * RECORD_FLOATS;
+            if (memcmp(a, b, shape) != 0)
+                break;
+        }
+        if (end - first > 1)
+            order_by_index(list, rows, first, end - first);
+    }
+}
+
 /* The rows in the order of their depth on a ray in the middle; those of the same depth, in that of the tile's
    list. Where two floats happen to be equal on one ray, this order decides: it knows more than they do. */
-static void order_by_middle(const tile_list *list, float t_near, list_rows *rows)
+static void order_by_middle(const kernel_scene *scene, const tile_list *list, list_rows *rows)
 {
     enum { MIDDLE = PACKET_PIXELS + 1, FEW = 256 };
     const size_t count = rows->count;
@@ -168,7 +203,8 @@ static void order_by_middle(const tile_list *list, float t_near, list_rows *rows
         rows->key[i] = t < FLT_MAX ? t : FLT_MAX; /* NaN, too */
     }
     for (size_t i = 0; list->any_general && i < count; i++) {
-        const bool first = vmask16_any(vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(t_near)));
+        const bool first =
+            vmask16_any(vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(scene->settings.t_near)));
         if (first || rows->key[i] == FLT_MAX) /* no hit there */
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;
@@ -181,6 +217,7 @@ static void order_by_middle(const tile_list *list, float t_near, list_rows *rows
         for (size_t i = 0; i < count; i++)
             rows->order[i] = (uint32_t)order[i];
     }
+    order_copies(scene, list, rows);
     if (cut)
         order_cut_rows(list, rows);
 }

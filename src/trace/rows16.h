@@ -10,8 +10,8 @@
 
    Exact order by t_c at the price of one comparison and one masked multiplication per overlapping pair,
    without keys, gathers or scatters.
-   Equal depths: the row order decides, which is the order of indices for Gaussians that are tied on all rays
-   and for depths cut at t_near. Included by kernels after simd16.h. */
+   Equal depths: the row order decides, which is the order of indices for Gaussians of one shape, place and
+   opacity and for depths cut at t_near. Included by kernels after simd16.h. */
 #ifndef GBT_TRACE_ROWS16_H
 #define GBT_TRACE_ROWS16_H
 

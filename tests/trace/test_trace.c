@@ -630,6 +630,33 @@ static void coincident_gaussians(void **state)
     }
 }
 
+/* Gaussians of one shape in one place go by index however opaque each is, though those that are less so end
+   before the others; few of them, and more than are ranked by pairs. Over the tree they must be equally
+   opaque. */
+static void copies_of_other_opacity(void **state)
+{
+    (void)state;
+    if (kernel == TRACE_TILE)
+        skip();
+    const trace_settings s = with_background();
+    for (size_t count = 3; count <= 300; count *= 10) {
+        const float most = count < 300 ? 0.5f : 0.03f;
+        gaussians g = some(count, 0);
+        for (size_t i = 0; i < count; i++) {
+            g.opacity[i] = most * (0.2f + 0.8f * (float)i / (float)(count - 1));
+            g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count;
+            g.scale_x[i] = 0.3f, g.scale_y[i] = 0.2f, g.scale_z[i] = 0.4f;
+        }
+        const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 40, 36, 30);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        const figures f = compare(&g, &s, &rays, 60, 1e-6);
+        assert_figures("copies", &f, 2e-5);
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+}
+
 /* The camera inside of many that hide each other, and no near depth: most hits are at depth 0, where they go
    by index, and one found late may come first. */
 static void inside_of_many(void **state)
@@ -1064,6 +1091,7 @@ int main(void)
         cmocka_unit_test(rays_that_do_not_run_together),
         cmocka_unit_test(one_hundred_thousand_hits),
         cmocka_unit_test(coincident_gaussians),
+        cmocka_unit_test(copies_of_other_opacity),
         cmocka_unit_test(inside_of_many),
         cmocka_unit_test(sheets_that_end_behind_a_wall),
         cmocka_unit_test(the_cap_is_exact),

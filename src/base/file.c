@@ -126,9 +126,18 @@ static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_coun
                              strerror(put < 0 ? errno : ENOSPC));
         done += (size_t)put;
     }
-    if (fsync(fd) != 0)
-        return base_fail(err, GBT_ERR_IO, "%s: fsync failed: %s", path, strerror(errno));
     return GBT_OK;
+}
+
+static gbt_status write_stream(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
+{
+    const int fd = open(path, O_WRONLY | O_APPEND | O_CLOEXEC);
+    if (fd < 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
+    gbt_status status = write_all(fd, bytes, byte_count, path, err);
+    if (close(fd) != 0 && status == GBT_OK)
+        status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", path, strerror(errno));
+    return status;
 }
 
 /* Where a path is: of "a/b" and of "a/": "a". */
@@ -154,6 +163,10 @@ static gbt_status check_folder(const char *folder, const char *path, gbt_error *
 gbt_status file_check_creatable(const char *path, gbt_error *err)
 {
     char folder[PATH_LIMIT];
+    if (file_is_stream(path))
+        return access(path, W_OK) == 0
+                   ? GBT_OK
+                   : base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
     folder_of(path, folder);
     GBT_TRY(check_folder(folder, path, err));
     return file_is_folder(path) ? base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(EISDIR))
@@ -185,6 +198,8 @@ void file_sync_folder_of(const char *path)
 
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
 {
+    if (file_is_stream(path))
+        return write_stream(path, bytes, byte_count, err);
     char temporary[PATH_LIMIT];
     const char *slash = strrchr(path, '/');
     const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
@@ -195,6 +210,8 @@ gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_co
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
     gbt_status status = write_all(fd, bytes, byte_count, path, err);
+    if (status == GBT_OK && fsync(fd) != 0)
+        status = base_fail(err, GBT_ERR_IO, "%s: fsync failed: %s", path, strerror(errno));
     if (close(fd) != 0 && status == GBT_OK)
         status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", path, strerror(errno));
     if (status == GBT_OK && rename(temporary, path) != 0)
@@ -271,6 +288,13 @@ bool file_is_folder(const char *path)
 {
     file_kind kind;
     return file_look(path, &kind, NULL) == GBT_OK && kind == FILE_FOLDER;
+}
+
+bool file_is_stream(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && !S_ISDIR(info.st_mode) &&
+           (!S_ISREG(info.st_mode) || strncmp(path, "/dev/std", 8) == 0 || strncmp(path, "/dev/fd/", 8) == 0);
 }
 
 bool file_is_same(const char *a, const char *b)

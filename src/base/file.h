@@ -39,7 +39,7 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.
  *
  * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
- * we see.
+ * we see. A device, a pipe or /dev/stdout is written to as it is.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
@@ -74,6 +74,10 @@ struct stat;
 gbt_status file_stat(const char *path, struct stat *out, bool *exists, gbt_error *err);
 
 typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
+
+/** Devices, pipes and names of open files (/dev/stdout): they are written to as they are, for a file renamed
+   to /dev/null would take its place. */
+bool file_is_stream(const char *path);
 
 /** What is at a path; errors as of file_stat(). */
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err);

@@ -42,12 +42,14 @@ gbt_status large_file_open(const char *path, large_file *out, gbt_error *err)
 gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
 {
     GBT_TRY(set_name(out, path, err));
+    const bool stream = file_is_stream(path);
     const char *slash = strrchr(path, '/');
     const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
-    if (snprintf(out->temporary, sizeof out->temporary, "%.*s.%s.tmp", folder_length, path,
-                 path + folder_length) >= (int)sizeof out->temporary)
+    if (!stream && snprintf(out->temporary, sizeof out->temporary, "%.*s.%s.tmp", folder_length, path,
+                            path + folder_length) >= (int)sizeof out->temporary)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-    const int fd = open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    const int fd = stream ? open(path, O_WRONLY | O_APPEND | O_CLOEXEC)
+                          : open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
     out->open = true;

@@ -2,6 +2,7 @@
 /* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian
    arrays, images, threads, vectors. */
 #include <dirent.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <sys/resource.h>
@@ -13,6 +14,7 @@
 #include "base/file.h"
 #include "base/gaussians.h"
 #include "base/image.h"
+#include "base/large_file.h"
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -315,6 +317,33 @@ static void places_are_looked_at(void **state)
         assert_int_equal(chmod(folder, 0755), 0);
     }
     remove_entries(folder);
+}
+
+/* What is no file is written to, and stays what it is. */
+static void streams_are_not_replaced(void **state)
+{
+    (void)state;
+    char path[512], got[8] = {0};
+    struct stat info;
+    large_file large;
+    assert_ok(file_join(path, sizeof path, folder, "pipe", NULL));
+    assert_int_equal(mkfifo(path, 0600), 0);
+    const int reader = open(path, O_RDONLY | O_NONBLOCK);
+    assert_true(reader >= 0 && file_is_stream(path) && file_is_stream("/dev/null"));
+    assert_ok(file_check_creatable(path, NULL));
+    assert_ok(file_write_atomic(path, "abc", 3, NULL));
+    assert_ok(large_file_create(path, &large, NULL));
+    assert_ok(large_file_put(&large, "de", 2, NULL));
+    assert_ok(large_file_close(&large, true, NULL));
+    assert_int_equal(read(reader, got, sizeof got), 5);
+    assert_string_equal(got, "abcde");
+    close(reader);
+    assert_int_equal(stat(path, &info), 0);
+    assert_true(S_ISFIFO(info.st_mode));
+    assert_int_equal(entry_count(folder), 1);
+    assert_ok(file_check_creatable("/dev/null", NULL));
+    remove_entries(folder);
+    assert_false(file_is_stream(path) || file_is_stream(folder));
 }
 
 /* A write that stops half-way (here at a file size limit) leaves the old file whole and no temporary one. */
@@ -657,6 +686,7 @@ int main(void)
         cmocka_unit_test(files_come_back),
         cmocka_unit_test(failed_writes_leave_nothing),
         cmocka_unit_test(places_are_looked_at),
+        cmocka_unit_test(streams_are_not_replaced),
         cmocka_unit_test(full_disk_keeps_the_old_file),
         cmocka_unit_test(reads_refuse_what_is_no_file),
         cmocka_unit_test(ends_tell_files_apart),

@@ -272,13 +272,42 @@ void loaded_run_view_name(const scene_view *view, char *out, size_t size)
     loaded_run_file_name(view->name, out, size);
 }
 
+/* Files are named after views, and then have more behind the name: ".transmittance.exr", and while they are
+   written ".tmp". 255 bytes are what file systems take. */
+enum { FILE_NAME_MAX = 200, FILE_NAME_KEPT = 180 };
+
+/* A long name ends by a hash of all of it (FNV-1a). */
+static void shorten(const char *name, char *out, size_t size)
+{
+    size_t kept = FILE_NAME_KEPT;
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (const char *c = name; *c != '\0'; c++)
+        hash = (hash ^ (unsigned char)*c) * 0x100000001b3u;
+    while (kept > 0 && ((unsigned char)out[kept] & 0xc0) == 0x80) /* never within a letter of UTF-8 */
+        kept--;
+    snprintf(out + kept, size - kept, "-%016llx", (unsigned long long)hash);
+}
+
+/* The dot before the ending of a photo. Of "1623.25", a time, ".25" is none. */
+static char *ending_of(char *name)
+{
+    static const char *const endings[] = {".png", ".jpg", ".jpeg", ".exr"};
+    char *dot = strrchr(name, '.');
+    for (size_t i = 0; dot != NULL && dot != name && i < sizeof endings / sizeof *endings; i++)
+        if (strcasecmp(dot, endings[i]) == 0)
+            return dot;
+    return NULL;
+}
+
 void loaded_run_file_name(const char *name, char *out, size_t size)
 {
     snprintf(out, size, "%s", name);
-    char *dot = strrchr(out, '.');
-    if (dot != NULL && dot != out && strchr(dot, '/') == NULL)
-        *dot = '\0';
+    char *ending = ending_of(out);
+    if (ending != NULL)
+        *ending = '\0';
     for (char *c = out; *c != '\0'; c++)
         if (*c == '/')
             *c = '_';
+    if (strlen(out) > FILE_NAME_MAX)
+        shorten(name, out, size);
 }

@@ -83,7 +83,8 @@ gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
 /** Settings by a preset. GBT_OK, or GBT_ERR_ARGUMENT ("preset: ...") for what is none. */
 gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err);
 
-/** "folder/a/b.jpg" becomes "a_b": a file name for what belongs to a view. */
+/** "a/b.jpg" becomes "a_b": a file name for what belongs to a view, of 200 bytes at most. `size`: above 200.
+ */
 void loaded_run_view_name(const scene_view *view, char *out, size_t size);
 void loaded_run_file_name(const char *view_name, char *out, size_t size);
 

@@ -5,6 +5,7 @@
 
 #include "gbtrace/evaluate.h"
 #include "image/metrics.h"
+#include "run/loaded_run.h"
 
 static void write_noise(const char *name, int width, int height, int channels, uint64_t seed)
 {
@@ -34,6 +35,30 @@ static void figures_are_those_of_the_metrics(void **state)
     assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1 && c.ssim_interior == 1 && c.flip == 0);
     image_free(&a);
     image_free(&b);
+}
+
+static void pictures_are_named_after_views(void **state)
+{
+    (void)state;
+    static const char *const names[][2] = {{"a/b.jpg", "a_b"},
+                                           {"a.b/c.JPEG", "a.b_c"},
+                                           {"1623.25", "1623.25"},
+                                           {"1623.25.png", "1623.25"},
+                                           {".png", ".png"}};
+    char got[256], other[256], name[3000];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        loaded_run_file_name(names[i][0], got, sizeof got);
+        assert_string_equal(got, names[i][1]);
+    }
+    /* A long name, of letters of two bytes behind one of one, stays below what file systems take. */
+    name[0] = 'a';
+    for (size_t i = 1; i + 2 < sizeof name; i += 2)
+        memcpy(name + i, "\xc3\xa4", 3);
+    loaded_run_file_name(name, got, sizeof got);
+    assert_true(strlen(got) == 179 + 17 && got[179] == '-');
+    name[sizeof name - 4] = '\0';
+    loaded_run_file_name(name, other, sizeof other);
+    assert_string_not_equal(got, other);
 }
 
 static void alpha_is_left_out(void **state)
@@ -89,6 +114,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(figures_are_those_of_the_metrics),
+        cmocka_unit_test(pictures_are_named_after_views),
         cmocka_unit_test(alpha_is_left_out),
         cmocka_unit_test(what_cannot_be_compared),
     };

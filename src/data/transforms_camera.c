@@ -52,27 +52,29 @@ static gbt_status find_size(const transforms_frame *s, const char *key, int *out
 static gbt_status focal_from_angle(const transforms_frame *s, char axis, int size, double *focal,
                                    gbt_error *err)
 {
-    double angle = 0;
+    const double pi = 3.14159265358979;
+    double value = 0, unit = 1;
     bool found;
     char key[16];
     snprintf(key, sizeof key, "camera_angle_%c", axis);
-    GBT_TRY(find_number(s, key, &angle, &found, err));
+    GBT_TRY(find_number(s, key, &value, &found, err));
     if (!found) {
         snprintf(key, sizeof key, "%c_fov", axis);
-        GBT_TRY(find_number(s, key, &angle, &found, err));
-        angle *= 3.14159265358979 / 180;
+        GBT_TRY(find_number(s, key, &value, &found, err));
+        unit = pi / 180;
     }
     *focal = 0;
     if (!found)
         return GBT_OK;
-    if (!(angle > 0 && angle < 3.14159265358979))
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: frame %zu: %s: out of range (wanted 0..pi radians, got %g)", s->file->name,
-                         s->frame_index, key, angle);
+    const double angle = value * unit;
+    if (!(angle > 0 && angle < pi))
+        return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: out of range (wanted %s, got %g)",
+                         s->file->name, s->frame_index, key, unit == 1 ? "0..pi radians" : "0..180 degrees",
+                         value);
     *focal = 0.5 * size / tan(0.5 * angle);
     if (!(*focal > 0 && *focal <= RAW_COORDINATE_LIMIT))
         return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: no lens has this angle (got %g)",
-                         s->file->name, s->frame_index, key, angle);
+                         s->file->name, s->frame_index, key, value);
     return GBT_OK;
 }
 

@@ -70,6 +70,26 @@ static uint64_t hash_of_views(const trainer *t)
     return hash;
 }
 
+/* And of their lenses and directions. */
+static uint64_t hash_of_lenses(const trainer *t)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < t->scene.view_count; i++) {
+        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[i] : &t->scene.views[i].camera;
+        const int params = gbt_camera_param_count(camera->model);
+        for (int k = -1; k < params + 9; k++) {
+            char text[32];
+            const double value = k < 0        ? (double)camera->model
+                                 : k < params ? camera->params[k]
+                                              : camera->rotation[k - params];
+            snprintf(text, sizeof text, "%.6f ", value);
+            for (int j = 0; text[j] != '\0'; j++)
+                hash = (hash ^ (unsigned char)text[j]) * 0x100000001b3u;
+        }
+    }
+    return hash;
+}
+
 gbt_status checkpoint_hash_photos(const scene *s, uint64_t *out, gbt_error *err)
 {
     *out = 0xcbf29ce484222325u;
@@ -118,6 +138,7 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(t)});
+    container_add_small(&w, "lenses", CONTAINER_U64, 1, (const uint64_t[]){hash_of_lenses(t)});
     container_add_small(&w, "photos", CONTAINER_U64, 1, &t->photos_hash);
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
@@ -248,6 +269,13 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     if (views != hash_of_views(t))
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: made from other data (%.1000s has photos of other names, sizes or cameras)",
+                         path, t->scene.folder);
+    uint64_t lenses = hash_of_lenses(t);
+    if (container_section_named(c, "lenses") != NULL) /* older checkpoints have none */
+        GBT_TRY(container_get(c, "lenses", CONTAINER_U64, 1, &lenses, err));
+    if (lenses != hash_of_lenses(t))
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: made from other data (%.1000s has photos with other lenses or directions)",
                          path, t->scene.folder);
     uint64_t saved;
     if (container_section_named(c, "photos") != NULL) { /* older checkpoints have none */

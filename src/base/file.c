@@ -134,9 +134,8 @@ static gbt_status write_stream(const char *path, const void *bytes, size_t byte_
     const int fd = open(path, O_WRONLY | O_APPEND | O_CLOEXEC);
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
-    gbt_status status = write_all(fd, bytes, byte_count, path, err);
-    if (close(fd) != 0 && status == GBT_OK)
-        status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", path, strerror(errno));
+    const gbt_status status = write_all(fd, bytes, byte_count, path, err);
+    close(fd);
     return status;
 }
 

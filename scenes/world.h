@@ -55,7 +55,7 @@ typedef struct world {
     float *position;    /* [vertex_count][3] */
     float *normal;      /* [vertex_count][3], unit, outward */
     float *uv;          /* [vertex_count][2] */
-    float *indirect;    /* [vertex_count][3]; NULL until world_light() */
+    float *indirect;    /* [vertex_count][3]; light from everything but the lamp; NULL until world_finish() */
     uint32_t *triangle; /* [triangle_count][3] */
     uint16_t *material; /* [triangle_count] */
     uint16_t *variant;  /* [triangle_count] */

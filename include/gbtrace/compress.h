@@ -40,7 +40,7 @@ gbt_compress_def gbt_compress_def_default(void);
  * @param report [in] open stream for the table of bytes; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
- * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 50 us per anchor.
+ * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 40 us per anchor.
  */
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err);

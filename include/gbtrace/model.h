@@ -32,8 +32,8 @@ typedef struct gbt_model gbt_model;
 /**
  * Open a trained model or a file of plain Gaussians.
  *
- * @param path [in]  RUN (a folder with model.gbt), a model file, or a .ply, .splat or .spz of plain
- *                   Gaussians. The data set is not needed
+ * @param path [in]  RUN (a folder with model.gbt), a model file, or plain Gaussians in any format of
+ *                   gbt_export_format_at(). The data set is not needed
  * @param out  [out] free with gbt_model_close(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY

@@ -37,7 +37,8 @@ typedef struct gbt_balls gbt_balls;
  * (also of gbtrace init): its `radius`, or points. A data set: its sparse points. A text file: a line per
  * ball, "x y z" or "x y z radius", commas or blanks, # for comments.
  *
- * @param path [in]  RUN, model.gbt, .ply, .splat, .spz, data set folder, or .txt, .csv, .xyz
+ * @param path [in]  RUN, model.gbt, plain Gaussians in any format of gbt_export_format_at(), .ply, data set
+ *                   folder, or .txt, .csv, .xyz
  * @param out  [out] free with gbt_balls_free(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL

@@ -17,7 +17,7 @@ typedef enum gbt_status {
     GBT_ERR_IO,          /* file system or device: exit code 4 */
     GBT_ERR_NO_MEMORY,   /* out of memory or over a stated limit: exit code 5 */
     GBT_ERR_INTERRUPTED, /* stopped by a signal after saving: exit code 130 */
-    GBT_ERR_INTERNAL     /* a library below us failed in a way that no input explains */
+    GBT_ERR_INTERNAL     /* a library below us failed in a way that no input explains: exit code 1 */
 } gbt_status;
 
 /** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err =

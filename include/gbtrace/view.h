@@ -32,8 +32,8 @@ gbt_view_def gbt_view_def_default(void);
  * A run that is being trained is followed: a new model.gbt is shown within a second or so. A run that has not
  * saved one yet is waited for.
  *
- * @param input [in] RUN (a folder that training writes), a model file, or plain Gaussians (.ply, .splat,
- *                   .spz)
+ * @param input [in] RUN (a folder that training writes), a model file, or plain Gaussians in any format of
+ *                   gbt_export_format_at()
  * @return GBT_OK, GBT_ERR_ARGUMENT (port, host), GBT_ERR_IO (also: the port is in use, the host is not this
  *         machine's), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

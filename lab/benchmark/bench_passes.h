@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_passes.h -- time passes over the same Gaussians and rays, traced or splatted in several
    ways in turn. */
-#ifndef GBT_EVAL_BENCH_PASSES_H
-#define GBT_EVAL_BENCH_PASSES_H
+#ifndef LAB_BENCHMARK_BENCH_PASSES_H
+#define LAB_BENCHMARK_BENCH_PASSES_H
 
 #include "base/cpu.h"
 #include "raster/raster.h"

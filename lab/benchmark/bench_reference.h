@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_reference.h -- some pixels of a picture in double, and how far another picture is from
    them. */
-#ifndef GBT_EVAL_BENCH_REFERENCE_H
-#define GBT_EVAL_BENCH_REFERENCE_H
+#ifndef LAB_BENCHMARK_BENCH_REFERENCE_H
+#define LAB_BENCHMARK_BENCH_REFERENCE_H
 
 #include "base/gaussians.h"
 #include "base/image.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the
    rays of one camera. */
-#ifndef GBT_EVAL_BENCH_SCENE_H
-#define GBT_EVAL_BENCH_SCENE_H
+#ifndef LAB_BENCHMARK_BENCH_SCENE_H
+#define LAB_BENCHMARK_BENCH_SCENE_H
 
 #include "render/camera_file.h"
 #include "run/loaded_run.h"

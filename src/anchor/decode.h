@@ -29,7 +29,7 @@ typedef struct decode_tape {
     uint32_t *slot; /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came
                        from */
     size_t slot_capacity;
-    float *opacity_sum; /* [visible_count]: sum over offsets of max(alpha, 0), for pruning (sec. 5.1) */
+    float *opacity_sum; /* [visible_count]: sum over offsets of max(alpha, 0): see GROWTH_BY_OPACITY */
 } decode_tape;
 
 /**

@@ -70,7 +70,7 @@ static const option *options_bench(int *count)
          .kind = OPTION_CHOICE,
          .value = &def.preset,
          .choices = GBT_PRESET_NAMES,
-         .help = "cut-off preset (docs/accuracy.md); the options above override it"},
+         .help = "cut-off preset (docs/accuracy.md); --alpha-min, --t-min and --proxy-radius override it"},
         {.name = "kernel",
          .kind = OPTION_STRING,
          .value = &def.kernel,

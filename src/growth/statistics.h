@@ -44,7 +44,7 @@ void growth_stats_free(growth_stats *s);
 /** How an anchor's importance is measured. */
 typedef enum growth_importance {
     GROWTH_BY_SHARE,  /* of the picture that its Gaussians cover: mean over rays of T alpha, over the views
-                         that  show it: those before which it is hidden say nothing of its worth */
+                         that show it: those before which it is hidden say nothing of its worth */
     GROWTH_BY_OPACITY /* sum of their decoded opacities, over all views, as the reference takes it */
 } growth_importance;
 

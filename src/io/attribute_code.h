@@ -25,9 +25,7 @@ enum {
 };
 
 /** Expected value of column c in a row: (bias + sum of weight x input) / ATTRIBUTE_ONE. Inputs: column c of
-    the neighbours, columns 0 .. c
- * - 1
-    of the row. */
+    the neighbours, columns below c of the row. */
 typedef struct attribute_rule {
     int32_t bias;
     int32_t weight[ATTRIBUTE_INPUTS_MAX];

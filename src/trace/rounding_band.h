@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/rounding_band.h -- rays on which float32 and double may decide differently: at a cut-off, or between
    equal depths. */
-#ifndef GBT_EVAL_ROUNDING_BAND_H
-#define GBT_EVAL_ROUNDING_BAND_H
+#ifndef GBT_TRACE_ROUNDING_BAND_H
+#define GBT_TRACE_ROUNDING_BAND_H
 
 #include <stdbool.h>
 

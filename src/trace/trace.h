@@ -2,7 +2,8 @@
 /* trace/trace.h -- ray tracing of Gaussians: build, forward, adjoint.
 
    What one ray sees is defined in docs/tracing.md; reference.h is that definition in double, and this is the
-   same in float32, sixteen rays at a time, over a tree (bvh/gaussian_tree.h). */
+   same in float32, sixteen rays at a time, over lists of what a tile may see (view_lists.h) or a tree
+   (bvh/gaussian_tree.h). */
 #ifndef GBT_TRACE_TRACE_H
 #define GBT_TRACE_TRACE_H
 
@@ -81,16 +82,17 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
 /**
  * Trace rays.
  *
- * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit
- *                        (trace_scene.tape_bytes_max)
- * @param out       [out] colour costs what tracing costs; each other output a few per cent more
- * @param counters  [in,out] optional, added to
  * Parts of rays (rays->near) are traced by TRACE_LIST and TRACE_SINGLE, without an adjoint. A hit has the
  * same t_c and alpha, to the bit, in every part and whatever else is in the scene; so parts that touch count
  * each hit once. Where TRACE_LIST can make no lists it does not walk the tree in their place: scene->listed
  * is then false after GBT_ERR_ARGUMENT.
  *
- * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb; parts that cannot be traced so), GBT_ERR_NO_MEMORY
+ * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit
+ *                        (trace_scene.tape_bytes_max)
+ * @param out       [out] colour costs what tracing costs; each other output a few per cent more
+ * @param counters  [in,out] optional, added to
+ * @return GBT_OK, GBT_ERR_ARGUMENT (size of out->rgb; parts that cannot be traced so), GBT_ERR_NO_MEMORY,
+ *         GBT_ERR_INTERRUPTED (scene->stop), GBT_ERR_INTERNAL (the tree)
  * Threads: uses all; same bits for every thread count.
  */
 gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_tape, const trace_outputs *out,
@@ -105,6 +107,7 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
  * @param weight       [out] optional (NULL), [count]: sum over rays of T alpha, how much each Gaussian was
  *                           seen
  * @param d_background [out] optional (NULL), [3], overwritten
+ * @return as trace_forward(); GBT_ERR_ARGUMENT also without such a forward pass before
  * Threads: uses all; same bits for every thread count (sums run in the order of packets and blocks).
  */
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,

@@ -11,9 +11,9 @@
 enum {
     FRAME_HEAD = 12,
     FRAME_TAIL = 4,
-    STEP_AT = 9,
+    STEP_AT = 9, /* behind the wall time: a byte and a double */
     PNG_HEADER = 24
-}; /* the step comes behind the wall time: a byte and a double */
+};
 
 /* Of protobuf: how a field is written. */
 enum { WIRE_VARINT = 0, WIRE_DOUBLE = 1, WIRE_BYTES = 2, WIRE_FLOAT = 5 };

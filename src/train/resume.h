@@ -15,7 +15,8 @@
  *
  * @param data     [in] the data set; NULL: where the run has it
  * @param latest   [in] the checkpoint; where it is missing or damaged, `previous`
- * @param def      [in] as gbt_train() was given it; says where threads, memory and checkpoints are concerned
+ * @param def      [in] as gbt_train() was given it; says how much memory may be used, and when
+ *                      checkpoints are made
  * @param strings  [out] keeps strings of t->def, for as long as `t` lives
  * @return GBT_OK; GBT_ERR_ARGUMENT: a length that the run has passed already; GBT_ERR_IO: no data, no
  *         checkpoint; GBT_ERR_FORMAT: a damaged checkpoint, other data

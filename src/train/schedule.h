@@ -91,7 +91,7 @@ double schedule_rate_end(double steps);
  */
 #define SCHEDULE_COOL_FROM 0.9
 
-/** Statistics are gathered from STATS_FROM on; anchors grow and are pruned from ADJUST_FROM on. */
+/** Statistics are gathered, and anchors grow and are pruned, from these parts of the training on. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
 /** With --refine-poses, until then the poses settle on the anchors as they start: none moves, grows or is

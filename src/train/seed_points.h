@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/seed_points.h -- a starting cloud for data sets that have no sparse points: places where the photos
-   agree. */
+/* train/seed_points.h -- a starting cloud for data sets with no or too few sparse points: places where the
+   photos agree. */
 #ifndef GBT_TRAIN_SEED_POINTS_H
 #define GBT_TRAIN_SEED_POINTS_H
 
 #include "train/photos.h"
 
 /**
- * Make points by plane sweep (Collins 1996), for data sets without any.
+ * Make points by plane sweep (Collins 1996).
  *
  * Random pixels of the photos (halved until 400 pixels long) are swept through 96 depths around the point
  * where the cameras' axes meet; a depth counts by the normalised correlation of 5 x 5 pixels with up to four

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Rays with a width: energy, the cases that can be said by hand, the adjoint, and the mean over
-   many thin rays. */
+/* tests/trace/test_footprint.c -- rays with a width: energy, the cases that can be said by hand, the adjoint,
+   and the mean over many thin rays. */
 #include "test_support.h"
 
 #include <math.h>

@@ -7,8 +7,6 @@
 #include "base/camera_pose.h"
 #include "base/vec.h"
 
-#define PI 3.14159265358979323846
-
 bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double dir_cam[3])
 {
     camera_lens lens;

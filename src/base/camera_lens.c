@@ -16,8 +16,6 @@
 #include "base/camera_lens_radial.h"
 #include "base/vec.h"
 
-#define PI 3.14159265358979323846
-
 /* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far
    outside the image. */
 static const double converged_px = 1e-10, converged_relative = 1e-14;

@@ -6,8 +6,7 @@
 
 #include "base/camera_lens_radial.h"
 #include "base/poly.h"
-
-#define PI 3.14159265358979323846
+#include "base/vec.h"
 
 /* A perspective ray flatter than this (1e-6 rad from the image plane) is outside every real image. */
 static const double perspective_radius_max = 1e6;

@@ -8,6 +8,8 @@
 #include <math.h>
 #include <stdbool.h>
 
+#define PI 3.14159265358979323846
+
 /** x to the precision of a float. Through memory: GCC 12 for x86-64 leaves both conversions out where it puts
    two neighbours into one register. */
 static inline double rounded_to_float(double x)

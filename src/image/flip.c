@@ -27,10 +27,8 @@ enum {
     BLOCK_ROWS = COLUMN_FILTERS + 2 * 5
 };
 
-static const double pi = 3.14159265358979323846;
-
 /* Section 5 of the paper: 0.7 m from a monitor 0.7 m wide with 3840 pixels. */
-static const double pixels_per_degree = 0.7 * (3840 / 0.7) * (3.14159265358979323846 / 180);
+static const double pixels_per_degree = 0.7 * (3840 / 0.7) * (PI / 180);
 
 /* Linear sRGB to XYZ, from the primaries and the white point (0.3127, 0.3290) of IEC 61966-2-1. */
 static const double rgb_to_xyz[3][3] = {
@@ -124,11 +122,11 @@ static double redistribute(const flip_filters *f, double distance)
 static double make_csf(filter *out, double b)
 {
     const double widest = 0.04;
-    out->radius = (int)ceil(3 * sqrt(widest / (2 * pi * pi)) * pixels_per_degree);
+    out->radius = (int)ceil(3 * sqrt(widest / (2 * PI * PI)) * pixels_per_degree);
     double sum = 0;
     for (int k = -out->radius; k <= out->radius; k++) {
         const double x = k / pixels_per_degree;
-        sum += out->taps[k + out->radius] = exp(-pi * pi * x * x / b);
+        sum += out->taps[k + out->radius] = exp(-PI * PI * x * x / b);
     }
     for (int k = 0; k <= 2 * out->radius; k++)
         out->taps[k] /= sum;
@@ -155,7 +153,7 @@ static void make_filters(flip_filters *f)
     const double amplitude[2] = {34.1, 13.5}, b[2] = {0.04, 0.025};
     for (int i = 0; i < 2; i++) {
         const double sum = make_csf(&f->blue_yellow[i], b[i]);
-        f->blue_yellow_weight[i] = amplitude[i] * sqrt(pi / b[i]) * sum * sum; /* of the 2-D filter */
+        f->blue_yellow_weight[i] = amplitude[i] * sqrt(PI / b[i]) * sum * sum; /* of the 2-D filter */
     }
     const double total = f->blue_yellow_weight[0] + f->blue_yellow_weight[1];
     f->blue_yellow_weight[0] /= total;

@@ -9,10 +9,10 @@
 #include "base/camera_model.h"
 #include "base/camera_pose.h"
 #include "base/fail.h"
+#include "base/vec.h"
 #include "trace/ray_file.h"
 
 enum { SAMPLES_MAX = 65536 };
-#define PI 3.14159265358979323846
 
 /* The models that a field of view, or the width of a view, says all of: two focal lengths and a centre at
    most. In a file their names have small letters. */

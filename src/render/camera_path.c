@@ -12,8 +12,6 @@
 #include "base/memory.h"
 #include "base/vec.h"
 
-#define PI 3.14159265358979323846
-
 gbt_status camera_path_alloc(camera_path *out, size_t count, gbt_error *err)
 {
     *out = (camera_path){.count = count};

@@ -13,7 +13,6 @@
 #include "base/vec.h"
 #include "render/camera_file.h"
 
-#define PI 3.14159265358979323846
 static const double rotation_tolerance = 1e-3, fps_most = 1000;
 
 /* ---- both ---- */

@@ -12,7 +12,6 @@
 #include "data/mesh_file.h"
 
 enum { OBJECTS_MAX = 1000 };
-#define PI 3.14159265358979323846
 
 static gbt_status take_lamp(const json_fields *all, const double origin[3], insert_scene *out)
 {

@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/image.h"
 #include "base/memory.h"
+#include "base/vec.h"
 
 enum { LONGEST_SIDE = 1280, JPEG_QUALITY = 84, COLORS = 256 };
 
@@ -38,7 +39,7 @@ void error_color(double error, float rgb[3])
                         chroma_most = 0.19;
     const double t = error > 0 ? fmin(error, 1) : 0; /* NaN is 0 */
     const double lightness = lightness_low + (lightness_high - lightness_low) * t;
-    const double hue = (hue_low + (hue_high - hue_low) * t) * (3.14159265358979323846 / 180);
+    const double hue = (hue_low + (hue_high - hue_low) * t) * (PI / 180);
     double low = 0, high = chroma_most, linear[3];
     for (int i = 0; i < 30; i++) { /* the strongest colour of this lightness and hue that a screen can show */
         const double middle = 0.5 * (low + high);

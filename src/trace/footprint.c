@@ -13,8 +13,7 @@
 #include "base/clones.h"
 #include "base/fail.h"
 #include "base/parallel.h"
-
-#define PI 3.14159265358979323846
+#include "base/vec.h"
 
 enum { LANES = 8, WIDEN_BLOCK = 512 /* a multiple of LANES */ };
 

@@ -19,8 +19,6 @@
 
 enum { ROW_GRAIN = 8 };
 
-#define PI 3.14159265358979323846
-
 /* The tracer sees no ray that starts farther out. */
 static const double origin_max = 1e17;
 

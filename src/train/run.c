@@ -12,6 +12,7 @@
 #include "base/paged.h"
 #include "base/parallel.h"
 #include "base/stop_signal.h"
+#include "base/vec.h"
 #include "cluster/cluster.h"
 #include "train/align.h"
 #include "train/checkpoint.h"
@@ -124,7 +125,7 @@ static gbt_status finish_poses(trainer *t, gbt_error *err)
     GBT_TRY(poses_moved(&t->poses, &t->scene, t->train_views, t->train_count, &angle, &distance, err));
     log_info("%s: poses moved by %.2g degrees and %.2g scene units (the median photo); %zu held-out photos "
              "are scored from where the scene fits them best",
-             t->scene.folder, angle * 57.29577951308232, distance, t->test_count);
+             t->scene.folder, angle * (180 / PI), distance, t->test_count);
     return GBT_OK;
 }
 

@@ -9,10 +9,9 @@
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/vec.h"
 #include "data/json_out.h"
 #include "view/studio.h"
-
-#define DEGREES (180 / 3.14159265358979323846)
 
 /* origin, target and up as a camera file has them. */
 static json_t *describe_pose(const gbt_camera *camera, const double origin[3])
@@ -35,7 +34,7 @@ static json_t *describe_view(const loaded_run *r, size_t i)
     gbt_camera_half_fov_tan(&camera, half_fov_tan);
     return json_pack("{s:o,s:b,s:i,s:i,s:s,s:f,s:o}", "name", json_text(view->name), "test", view->is_test,
                      "width", camera.width, "height", camera.height, "lens",
-                     gbt_camera_model_name(camera.model), "fov_x_deg", 2 * DEGREES * atan(half_fov_tan[0]),
+                     gbt_camera_model_name(camera.model), "fov_x_deg", 2 * (180 / PI) * atan(half_fov_tan[0]),
                      "camera", describe_pose(&camera, r->model.origin));
 }
 

@@ -16,6 +16,7 @@
 #include "anchor/activations.h"
 #include "anchor/decode_layout.h"
 #include "base/clones.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -30,8 +31,6 @@ typedef struct forward_job {
     gaussians *out;
     decode_tape *tape;
 } forward_job;
-
-static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
 
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
@@ -80,7 +79,7 @@ static void decide_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        decide_rows(context, row, min_size(row + DECODE_CHUNK, end));
+        decide_rows(context, row, smaller_size(row + DECODE_CHUNK, end));
 }
 
 /* Logits of the kept Gaussians into their places in the tape, and what needs no activation into `out`. */
@@ -128,10 +127,10 @@ FASTEST_CLONE static void hold_ratio(float *const scale[3], size_t count)
 {
     float *restrict x = scale[0], *restrict y = scale[1], *restrict z = scale[2];
     for (size_t i = 0; i < count; i++) {
-        const float least = DECODE_SCALE_RATIO * decode_larger(x[i], decode_larger(y[i], z[i]));
-        x[i] = decode_larger(x[i], least);
-        y[i] = decode_larger(y[i], least);
-        z[i] = decode_larger(z[i], least);
+        const float least = DECODE_SCALE_RATIO * larger(x[i], larger(y[i], z[i]));
+        x[i] = larger(x[i], least);
+        y[i] = larger(y[i], least);
+        z[i] = larger(z[i], least);
     }
 }
 

@@ -50,8 +50,7 @@ FASTEST_CLONE static void back_scales(const batch_in *restrict in, const float *
             scale[c][i] = in->extent[3 + c][i] * kept[(size_t)(KEPT_SIGMOID + c) * stride + i];
     }
     for (size_t i = 0; i < count; i++) {
-        const float x = scale[0][i], y = scale[1][i], z = scale[2][i],
-                    most = decode_larger(x, decode_larger(y, z));
+        const float x = scale[0][i], y = scale[1][i], z = scale[2][i], most = larger(x, larger(y, z));
         largest[i] = most;
         least[i] = DECODE_SCALE_RATIO * most;
         const float from_x = x < least[i] ? slope[0][i] : 0.0f, from_y = y < least[i] ? slope[1][i] : 0.0f,

@@ -11,6 +11,7 @@
 #include "anchor/activations.h"
 #include "anchor/decode.h"
 #include "anchor/dense.h"
+#include "base/compare.h"
 
 enum {
     DECODE_CHUNK = 120,
@@ -62,8 +63,6 @@ static inline size_t decode_tiled(size_t rows)
 {
     return (rows + DECODE_TILE - 1) / DECODE_TILE * DECODE_TILE;
 }
-
-static inline float decode_larger(float a, float b) { return a > b ? a : b; }
 
 /** The networks as the kernels read them; every array points into one block. */
 typedef struct decode_weights {

@@ -1,7 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/compare.h -- orders for qsort(). */
+/* base/compare.h -- the smaller and the larger of two; orders for qsort(). */
 #ifndef GBT_BASE_COMPARE_H
 #define GBT_BASE_COMPARE_H
+
+#include <stddef.h>
+
+/** As fmaxf() and fminf() of numbers, but not calls. */
+static inline float larger(float a, float b) { return a > b ? a : b; }
+static inline float smaller(float a, float b) { return a < b ? a : b; }
+
+static inline size_t smaller_size(size_t a, size_t b) { return a < b ? a : b; }
 
 /** Ascending floats, none of them NaN. */
 static inline int compare_floats(const void *a, const void *b)

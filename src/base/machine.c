@@ -12,6 +12,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/compare.h"
+
 enum { PATH_SIZE = 4096, LINE_SIZE = 1024 };
 
 /* The first line of root/folder/name that starts with `key`; its rest, without the newline. */
@@ -34,8 +36,6 @@ static bool read_line(const char *root, const char *folder, const char *name, co
     return found;
 }
 
-static size_t smaller(size_t a, size_t b) { return a < b ? a : b; }
-
 /* "name : value kB" */
 static size_t read_kilobytes(const char *root, const char *key)
 {
@@ -55,7 +55,7 @@ static void limit_memory(machine *m, const char *text)
 {
     const unsigned long long bytes = strtoull(text, NULL, 10);
     if (bytes > 0) /* "max" */
-        m->memory_limit_bytes = smaller(m->memory_limit_bytes, (size_t)bytes);
+        m->memory_limit_bytes = smaller_size(m->memory_limit_bytes, (size_t)bytes);
 }
 
 /* Limits of `group` ("/a/b") and of all that it is in, under `mount`. */
@@ -127,7 +127,7 @@ machine machine_read(const char *root)
     m.memory_free_bytes = read_kilobytes(root, "MemAvailable:");
     read_all_groups(&m, root);
     if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY)
-        m.memory_limit_bytes = smaller(m.memory_limit_bytes, (size_t)space.rlim_cur);
+        m.memory_limit_bytes = smaller_size(m.memory_limit_bytes, (size_t)space.rlim_cur);
     return m;
 }
 

@@ -14,6 +14,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/compare.h"
 #if defined(__AVX512F__) && defined(__AVX512BW__) && defined(__AVX512DQ__) && defined(__AVX512VL__)
 #include "base/simd16_avx512.h"
 #elif defined(__AVX2__) && defined(__FMA__)
@@ -72,10 +73,6 @@ static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *o
     return count;
 }
 #endif
-
-/* As fmaxf() and fminf() of numbers, but not calls. */
-static inline float larger(float a, float b) { return a > b ? a : b; }
-static inline float smaller(float a, float b) { return a < b ? a : b; }
 
 #ifndef VMASK16_ANY
 static inline int vmask16_any(vmask16 m) { return vmask16_bits(m) != 0; }

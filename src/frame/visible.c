@@ -7,6 +7,7 @@
 
 #include "base/camera_pose.h"
 #include "base/clones.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -298,11 +299,6 @@ typedef struct part_ball {
     const float *center;
     float farthest, scale;
 } part_ball;
-
-/* As fmaxf() and fminf() of numbers, but not calls. */
-static inline float larger(float a, float b) { return a > b ? a : b; }
-
-static inline float smaller(float a, float b) { return a < b ? a : b; }
 
 static part_ball anchor_ball(const anchors *a, size_t i)
 {

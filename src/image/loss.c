@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -74,22 +75,20 @@ typedef struct loss_tile {
     size_t owned, column; /* columns it owns, from `column` on */
 } loss_tile;
 
-static size_t min_size(size_t a, size_t b) { return a < b ? a : b; }
-
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
 static loss_tile tile_at(const loss_job *job, loss_room *room, size_t index)
 {
     loss_tile t = {.job = job, .room = room};
     t.column = index % job->across * TILE_OWNED;
-    t.owned = min_size(TILE_OWNED, job->width - t.column);
+    t.owned = smaller_size(TILE_OWNED, job->width - t.column);
     t.first = (ptrdiff_t)t.column - RADIUS;
     t.segment = round_up(t.owned + 2 * RADIUS, LOSS_LANES * LOSS_GROUP) / LOSS_LANES;
     if (t.segment < LOSS_LANES)
         t.segment = LOSS_LANES;
     t.count = t.segment * LOSS_STEP;
     t.begin = index / job->across * job->band_rows;
-    t.end = min_size(t.begin + job->band_rows, job->height);
+    t.end = smaller_size(t.begin + job->band_rows, job->height);
     return t;
 }
 
@@ -362,7 +361,7 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
     const size_t bands = band_count(job.height, job.across);
     job.tile_count = job.across * bands;
     job.band_rows = round_up(parallel_block_count(job.height, bands), LOSS_GROUP);
-    job.room_count = min_size((size_t)parallel_threads(), job.tile_count);
+    job.room_count = smaller_size((size_t)parallel_threads(), job.tile_count);
     const size_t room_doubles = job.room_count * sizeof(loss_room) / sizeof(double);
     GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0,
                         room_doubles + SUMS * job.tile_count, sizeof *scratch->buffer, "loss scratch", err));

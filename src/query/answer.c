@@ -7,6 +7,7 @@
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "data/number.h"
 #include "gbtrace/query.h"
 #include "query/rows.h"
 
@@ -55,18 +56,10 @@ static double *take(const query_rows *rows, size_t from, size_t width, gbt_error
 
 /* ---- out ---- */
 
-/* The shortest text that reads back as the same double. */
 static void put(FILE *out, char before, double value)
 {
-    char text[40];
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        if (strtod(text, NULL) == value)
-            break;
-    }
-    char *comma = strchr(text, ','); /* of the caller's locale */
-    if (comma != NULL)
-        *comma = '.';
+    char text[NUMBER_TEXT_SIZE];
+    number_format_double(value, text);
     fprintf(out, "%c%s", before, text);
 }
 

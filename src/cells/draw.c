@@ -47,7 +47,6 @@ static gbt_status draw_cell(const picture *p, gbt_error *err)
     if (d->load.count == 0)
         return GBT_OK;
     d->drawn_cells++;
-    d->drawn_gaussians += d->load.count;
     GBT_TRY(trace_build(&d->scene, &d->load.sorted, &d->settings, ray_image_reach(&d->rays), err));
     const trace_outputs wanted = {.rgb = &d->part, .transmittance = d->left, .ended = d->ended};
     GBT_TRY(trace_forward(&d->scene, &d->rays, false, &wanted, NULL, err));
@@ -84,7 +83,7 @@ static gbt_status draw_all(cell_drawer *d, const ray_shot *shot, image *out, gbt
 {
     const picture p = {d, out};
     const cell_part whole = cell_whole();
-    d->drawn_cells = d->drawn_gaussians = 0;
+    d->drawn_cells = 0;
     GBT_TRY(cell_view_start(d, shot, err));
     GBT_TRY(cell_share_find(d, err));
     GBT_TRY(image_fit(out, d->rays.width, d->rays.height, 3, err));

@@ -57,7 +57,7 @@ typedef struct cell_drawer {
     size_t visible_count, visible_capacity;
     trace_scene scene;
     cell_load load;
-    size_t drawn_cells, drawn_gaussians; /* of the last picture */
+    size_t drawn_cells; /* of the last picture */
 } cell_drawer;
 
 /**

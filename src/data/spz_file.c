@@ -129,13 +129,8 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     return status;
 }
 
-/*
- * Read one, in the axes that it has (those of the .ply it was made from, as nearly every writer keeps them).
- *
- * @param out [out] free with gaussian_cloud_free(); zeroed on failure
- * @return GBT_OK; GBT_ERR_FORMAT (damaged, another version, more than the streams hold); GBT_ERR_NO_MEMORY
- */
-gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
+/* In the axes that it has: those of the .ply it was made from, as nearly every writer keeps them. */
+static gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
     if (file->size >= 4 && memcmp(file->bytes, "NGSP", 4) == 0)

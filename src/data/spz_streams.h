@@ -44,9 +44,7 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
 gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, gaussian_cloud *out,
                       gbt_error *err);
 
-/** Readers of any version, and of version 4: a file that begins with the bytes NGSP. As gaussian_format.read.
- */
-gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
+/** Read version 4: a file that begins with the bytes NGSP. As gaussian_format.read. */
 gbt_status spz4_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
 /** Write version 4: the values of version 3, packed better and unpacked faster. As gaussian_format.write. */

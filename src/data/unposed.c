@@ -34,7 +34,7 @@ bool unposed_is_other_photo(const char *name)
     return ends_as(name, endings, sizeof endings / sizeof *endings);
 }
 
-bool unposed_is_film(const char *name)
+static bool is_film(const char *name)
 {
     static const char *const endings[] = {".mp4", ".mov",  ".m4v", ".mkv", ".webm", ".avi",
                                           ".mpg", ".mpeg", ".mts", ".3gp", ".wmv",  ".gif"};
@@ -62,12 +62,12 @@ bool unposed_has_photos(const char *folder, int depth) { return has_files(folder
 
 gbt_status unposed_check(const char *path, gbt_error *err)
 {
-    const bool is_film = !file_is_folder(path) && unposed_is_film(path);
-    if (!is_film && !unposed_has_photos(path, 1) && !has_files(path, 1, unposed_is_other_photo))
+    const bool film = !file_is_folder(path) && is_film(path);
+    if (!film && !unposed_has_photos(path, 1) && !has_files(path, 1, unposed_is_other_photo))
         return GBT_OK;
     const char *quote =
         strpbrk(path, " &;()") != NULL ? "'" : ""; /* as a shell takes the name for one word */
     return base_fail(err, GBT_ERR_FORMAT,
                      "%s: %s without camera poses (find them with: gbtrace pose %s%s%s -o DATA)", path,
-                     is_film ? "a film" : "photos", quote, path, quote);
+                     film ? "a film" : "photos", quote, path, quote);
 }

@@ -13,9 +13,6 @@ bool unposed_is_photo(const char *name);
 /** Whether a file name ends as those of photos do that cannot: .heic, .webp, .tif, raw ones and others. */
 bool unposed_is_other_photo(const char *name);
 
-/** Whether a file name ends as those of films do: .mp4, .mov, .mkv and others. */
-bool unposed_is_film(const char *name);
-
 /** Whether a folder has a photo of such a name, or a folder in it, `depth` levels down at most. */
 bool unposed_has_photos(const char *folder, int depth);
 

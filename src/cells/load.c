@@ -10,7 +10,7 @@
 #include "cells/view.h"
 #include "frame/plain.h"
 
-enum { ROWS_TOGETHER = 16384, UNPACK_BLOCK = 1024, SORT_BITS = 11, TILE_PIXELS = 16 };
+enum { ROWS_TOGETHER = 16384, UNPACK_BLOCK = 1024, SORT_BITS = 11 };
 
 /* ---- one piece of rows ---- */
 

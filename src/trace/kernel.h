@@ -20,6 +20,7 @@ enum {
     PACKET_PIXELS = 4, /* a packet is 4 x 4 pixels */
     TILE_ACROSS = 4,   /* a tile is 4 x 4 packets */
     TILE_PACKETS = TILE_ACROSS * TILE_ACROSS,
+    TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS,
     RECORD_FLOATS = 16 /* one cache line per Gaussian */
 };
 

@@ -8,8 +8,6 @@
 #include "trace/list_view.h"
 #include "trace/trace.h"
 
-enum { TILE_PIXELS = TILE_ACROSS * PACKET_PIXELS };
-
 /** Rays of a tile, or of a part of it (NULL: all); lanes outside the image or without a ray are not active.
  */
 void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,

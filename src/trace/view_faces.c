@@ -16,8 +16,6 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { TILE_SIDE = TILE_ACROSS * PACKET_PIXELS };
-
 /* A face sees rays up to 72 degrees from its axis. */
 static const float component_least = 0.3f;
 
@@ -109,10 +107,11 @@ typedef struct pixel_range {
 
 static pixel_range tile_pixels(const ray_image *rays, size_t tile)
 {
-    const int across = (rays->width + TILE_SIDE - 1) / TILE_SIDE,
-              x0 = (int)(tile % (size_t)across) * TILE_SIDE, y0 = (int)(tile / (size_t)across) * TILE_SIDE;
-    return (pixel_range){x0, x0 + TILE_SIDE < rays->width ? x0 + TILE_SIDE : rays->width, y0,
-                         y0 + TILE_SIDE < rays->height ? y0 + TILE_SIDE : rays->height};
+    const int across = (rays->width + TILE_PIXELS - 1) / TILE_PIXELS,
+              x0 = (int)(tile % (size_t)across) * TILE_PIXELS,
+              y0 = (int)(tile / (size_t)across) * TILE_PIXELS;
+    return (pixel_range){x0, x0 + TILE_PIXELS < rays->width ? x0 + TILE_PIXELS : rays->width, y0,
+                         y0 + TILE_PIXELS < rays->height ? y0 + TILE_PIXELS : rays->height};
 }
 
 static const float *ray_at(const ray_image *rays, int x, int y)
@@ -366,8 +365,8 @@ static gbt_status make_boxes(view_lists *lists, gbt_error *err)
 
 gbt_status view_faces_make(view_lists *lists, const ray_image *rays, bool *usable, gbt_error *err)
 {
-    const size_t tiles = (size_t)((rays->width + TILE_SIDE - 1) / TILE_SIDE) *
-                         (size_t)((rays->height + TILE_SIDE - 1) / TILE_SIDE);
+    const size_t tiles = (size_t)((rays->width + TILE_PIXELS - 1) / TILE_PIXELS) *
+                         (size_t)((rays->height + TILE_PIXELS - 1) / TILE_PIXELS);
     face_job job = {.lists = lists, .rays = rays};
     *usable = rays->common_origin && make_frame(rays, &lists->view.face[0].frame);
     if (!*usable)

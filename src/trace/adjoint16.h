@@ -217,27 +217,14 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
 {
     const adjoint_group *group = &o->group[first / 16];
     const float *rows[16];
-    vfloat16 sum[16], turned[16], e[3][3], half[3][3];
+    vfloat16 sum[16], turned[16], e[3][3];
     for (int i = 0; i < 16; i++)
         rows[i] =
             o->field[FIELD_RAW] + (size_t)(first + (first + i < o->sorted.count ? i : 0)) * PACKET_LANES;
     vfloat16_load_turned(rows, sum);
     for (int k = 0; k < 9; k++)
         e[k / 3][k % 3] = vfloat16_load(group->axes[k]);
-    const vfloat16 *vv = sum + GRADIENT_VV; /* xx yy zz yz zx xy */
-    static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
-    for (int k = 0; k < 3; k++)
-        for (int j = 0; j < 3; j++)
-            half[k][j] =
-                vfloat16_fma(vv[at[k][2]], e[2][j],
-                             vfloat16_fma(vv[at[k][1]], e[1][j], vfloat16_mul(vv[at[k][0]], e[0][j])));
-    for (int i = 0; i < 3; i++)
-        for (int j = i; j < 3; j++)
-            turned[GRADIENT_VV + at[i][j]] = vfloat16_fma(
-                e[2][i], half[2][j], vfloat16_fma(e[1][i], half[1][j], vfloat16_mul(e[0][i], half[0][j])));
-    for (int i = 0; i < 3; i++)
-        turned[GRADIENT_V + i] =
-            vfloat16_fma(e[2][i], sum[2], vfloat16_fma(e[1][i], sum[1], vfloat16_mul(e[0][i], sum[0])));
+    turn_moments(e, sum + GRADIENT_V, sum + GRADIENT_VV, turned);
     for (int k = GRADIENT_OPACITY; k < 16; k++)
         turned[k] = sum[k];
     return add_turned(entry + first, o->sorted.count - first, turned, out);

@@ -149,6 +149,26 @@ static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, v
         r->v[i] = vfloat16_select(clipped, r->v[i], vfloat16_div(v[i], ww));
 }
 
+/* E^T v and E^T (v v^T) E of sixteen Gaussians, from the axes E in which their sums were made to their own;
+   in the order of a gradient_record. */
+static inline void turn_moments(vfloat16 e[3][3], const vfloat16 v[3], const vfloat16 vv[6],
+                                vfloat16 out[GRADIENT_OPACITY])
+{
+    static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}}; /* in xx yy zz yz zx xy */
+    vfloat16 column[3][3], half[3][3];
+    for (int j = 0; j < 3; j++) {
+        for (int k = 0; k < 3; k++)
+            column[j][k] = e[k][j];
+        for (int k = 0; k < 3; k++) {
+            const vfloat16 row[3] = {vv[at[k][0]], vv[at[k][1]], vv[at[k][2]]};
+            half[j][k] = dot16(row, column[j]);
+        }
+        out[GRADIENT_V + j] = dot16(column[j], v);
+        for (int i = 0; i <= j; i++)
+            out[GRADIENT_VV + at[i][j]] = dot16(column[i], half[j]);
+    }
+}
+
 /* The smallest alpha that is a hit: alpha_min, or what is left of the opacity at the proxy's radius. */
 static inline vfloat16 alpha_threshold(const kernel_scene *scene, vfloat16 opacity)
 {

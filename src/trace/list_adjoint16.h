@@ -389,13 +389,12 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
 static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
                       size_t end, gradient_record *out)
 {
-    static const int at[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}}; /* in xx yy zz yz zx xy */
     for (size_t first = begin; first < end; first += 16) {
         _Alignas(64) float by_record[16][16], turned[16][16];
         _Alignas(64) float slope[3][16];
         const float *rows[16];
         uint32_t id[16];
-        vfloat16 sum[16], half[3][3], to[16];
+        vfloat16 sum[16], to[GRADIENT_OPACITY];
         view_form form;
         gather_slots(view, first, end, by_record);
         for (size_t i = 0; i < 16; i++) {
@@ -419,19 +418,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
         hv[0] = vfloat16_sub(zero, hv[0]);
         hvv[4] = vfloat16_sub(zero, hvv[4]);
         hvv[5] = vfloat16_sub(zero, hvv[5]);
-        for (int k = 0; k < 3; k++)
-            for (int j = 0; j < 3; j++)
-                half[k][j] = vfloat16_fma(
-                    hvv[at[k][2]], form.e[2][j],
-                    vfloat16_fma(hvv[at[k][1]], form.e[1][j], vfloat16_mul(hvv[at[k][0]], form.e[0][j])));
-        for (int i = 0; i < 3; i++)
-            for (int j = i; j < 3; j++)
-                to[GRADIENT_VV + at[i][j]] = vfloat16_fma(
-                    form.e[2][i], half[2][j],
-                    vfloat16_fma(form.e[1][i], half[1][j], vfloat16_mul(form.e[0][i], half[0][j])));
-        for (int i = 0; i < 3; i++)
-            to[GRADIENT_V + i] = vfloat16_fma(
-                form.e[2][i], hv[2], vfloat16_fma(form.e[1][i], hv[1], vfloat16_mul(form.e[0][i], hv[0])));
+        turn_moments(form.e, hv, hvv, to);
         for (int k = 0; k < 9; k++)
             vfloat16_store(turned[k], to[k]);
         for (size_t i = 0; i < 16 && first + i < end; i++) {

@@ -3,6 +3,7 @@
 #include "data/colmap_place.h"
 
 #include <dirent.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -28,19 +29,19 @@ static gbt_status count_model_files(const char *folder, const char *ending, int 
     return GBT_OK;
 }
 
-gbt_status colmap_place_find(const char *folder, bool of_nerfstudio, char *model, size_t size,
+gbt_status colmap_place_find(const char *folder, colmap_layout layout, char *model, size_t size,
                              const char **ending, gbt_error *err)
 {
-    static const char *const usual[] = {"sparse/0", "sparse", ""}, *const nerfstudio[] = {"colmap/sparse/0"};
-    const char *const *places = of_nerfstudio ? nerfstudio : usual;
-    for (size_t i = 0; i < (of_nerfstudio ? 1 : sizeof usual / sizeof *usual); i++) {
+    static const char *const places[][3] = {
+        [COLMAP_USUAL] = {"sparse/0", "sparse", ""}, [COLMAP_NERFSTUDIO] = {"colmap/sparse/0"}};
+    for (int i = 0; i < 3 && places[layout][i] != NULL; i++) {
         int binary, text;
-        GBT_TRY(file_join(model, size, folder, places[i], err));
+        GBT_TRY(file_join(model, size, folder, places[layout][i], err));
         GBT_TRY(count_model_files(model, "bin", &binary, err));
         GBT_TRY(count_model_files(model, "txt", &text, err));
         /* A complete set wins over an incomplete one, then binary over text. */
         *ending = binary == 3 || (text != 3 && binary > 0) ? "bin" : "txt";
-        if (binary > 0 || text == 3 || (text > 0 && places[i][0] != '\0'))
+        if (binary > 0 || text == 3 || (text > 0 && places[layout][i][0] != '\0'))
             return GBT_OK;
     }
     model[0] = '\0';

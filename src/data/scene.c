@@ -80,12 +80,12 @@ static gbt_status read_model(const char *model, const char *ending, raw_scene *r
 }
 
 /* The model that is in `folder`, if there is one. */
-static gbt_status load_colmap(const char *folder, bool of_nerfstudio, raw_scene *raw, const char **source,
+static gbt_status load_colmap(const char *folder, colmap_layout layout, raw_scene *raw, const char **source,
                               bool *found, gbt_error *err)
 {
     char model[PATH_SIZE];
     const char *ending;
-    GBT_TRY(colmap_place_find(folder, of_nerfstudio, model, sizeof model, &ending, err));
+    GBT_TRY(colmap_place_find(folder, layout, model, sizeof model, &ending, err));
     *found = model[0] != '\0';
     if (!*found)
         return GBT_OK;
@@ -213,7 +213,7 @@ static gbt_status load_folder(const char *path, raw_scene *raw, const char **sou
 {
     char place[PATH_SIZE];
     bool found;
-    GBT_TRY(load_colmap(path, false, raw, source, &found, err));
+    GBT_TRY(load_colmap(path, COLMAP_USUAL, raw, source, &found, err));
     if (found)
         return GBT_OK;
     GBT_TRY(file_join(place, sizeof place, path, "transforms.json", err));
@@ -226,7 +226,7 @@ static gbt_status load_folder(const char *path, raw_scene *raw, const char **sou
         *source = "blender";
         return load_blender(place, path, raw, err);
     }
-    GBT_TRY(load_colmap(path, true, raw, source, &found, err));
+    GBT_TRY(load_colmap(path, COLMAP_NERFSTUDIO, raw, source, &found, err));
     if (found)
         return GBT_OK;
     GBT_TRY(colmap_place_check(path, err));

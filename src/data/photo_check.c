@@ -79,13 +79,14 @@ static void compare_with_photo(photo_check *c, const char *mask_path, const imag
     refuse(c, &c->other_shape, &why);
 }
 
-static void check_view(photo_check *c, const scene_view *view)
+static void check_view(photo_check *c, scene_view *view)
 {
     image_header h, mask;
     const bool has_photo = read_header(c, view->path, &h);
     if (has_photo) {
         const bool is_first = c->found++ == 0;
         c->with_alpha += h.has_alpha;
+        view->photo_width = h.width;
         c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
         c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
         c->max_width = h.width > c->max_width ? h.width : c->max_width;
@@ -99,7 +100,7 @@ static void check_view(photo_check *c, const scene_view *view)
         compare_with_photo(c, view->mask_path, &mask, &h);
 }
 
-void photo_check_all(const scene *s, photo_check *out)
+void photo_check_all(scene *s, photo_check *out)
 {
     *out = (photo_check){0};
     for (size_t i = 0; i < s->view_count; i++)

@@ -22,8 +22,8 @@ typedef struct photo_check {
     gbt_error refused; /* the first reason for which training would refuse one; status GBT_OK: none */
 } photo_check;
 
-/** Cost: a few reads per photo. */
-void photo_check_all(const scene *s, photo_check *out);
+/** Sets photo_width of the views. Cost: a few reads per photo. */
+void photo_check_all(scene *s, photo_check *out);
 
 /** A warning, each in one line, for photos that are turned and for tiny ones. */
 void photo_check_warn(const photo_check *check, const char *data);

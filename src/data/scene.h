@@ -29,6 +29,7 @@ typedef struct scene_view {
     char *mask_path;   /* a picture whose dark pixels say which ones of the photo mean nothing; NULL: none;
                           owned */
     scene_alpha alpha; /* see scene_set_alpha() */
+    int photo_width;   /* as the photo's header says; 0: not read (photo_check_all()), or unreadable */
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
     size_t rank; /* place in the sorted list of all views that the data set names, those without a photo too

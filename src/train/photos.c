@@ -33,10 +33,10 @@ double photos_downscale_to(const scene *s, double width)
     float *ratios = widths + s->view_count; /* of the cameras' widths to them */
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
-        image_header h;
-        const bool is_smaller = view->path != NULL && image_header_read(view->path, &h, NULL) == GBT_OK &&
-                                h.width > 0 && h.width < view->camera.width;
-        widths[i] = (float)(is_smaller ? h.width : view->camera.width);
+        image_header h = {.width = view->photo_width};
+        if (h.width == 0 && view->path != NULL && image_header_read(view->path, &h, NULL) != GBT_OK)
+            h.width = 0;
+        widths[i] = (float)(h.width > 0 && h.width < view->camera.width ? h.width : view->camera.width);
         ratios[i] = (float)view->camera.width / widths[i];
     }
     const double is = median(widths, s->view_count), ratio = median(ratios, s->view_count);

@@ -10,10 +10,12 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "base/log.h"
 #include "base/paged.h"
 #include "base/parallel.h"
+#include "data/photo_check.h"
 #include "data/photo_size.h"
 #include "io/model_file.h"
 #include "quiet.h"
@@ -1454,7 +1456,7 @@ static void wide_photos_get_a_usual_width(void **state)
     (void)state;
     scene_view views[3] = {
         {.camera = {.width = 800}}, {.camera = {.width = 4000}}, {.camera = {.width = 3200}}};
-    const scene s = {.views = views, .view_count = 3};
+    scene s = {.views = views, .view_count = 3};
     assert_true(photos_usual_downscale(&s, true) == 2 && photos_usual_downscale(&s, false) == 1);
     assert_true(photos_downscale_to(&s, 2400) == 3200.0 / 2400 && photos_downscale_to(&s, 4000) == 1);
     views[1].camera.width = 1600;
@@ -1470,6 +1472,10 @@ static void wide_photos_get_a_usual_width(void **state)
     assert_ok(image_write(views[0].path, &photo, NULL));
     image_free(&photo);
     assert_true(photos_usual_downscale(&s, true) == 5 && photos_usual_downscale(&s, false) == 5);
+    photo_check check;
+    photo_check_all(&s, &check);
+    assert_int_equal(unlink(views[0].path), 0);
+    assert_true(photos_usual_downscale(&s, true) == 5); /* headers are read once */
     trainer t;
     const gbt_train_def def = run_def();
     open_ok(&t, tiny, &def);

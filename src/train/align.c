@@ -6,7 +6,6 @@
 
 #include "base/fail.h"
 #include "base/stop_signal.h"
-#include "train/near.h"
 
 enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60 };
 static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
@@ -15,9 +14,7 @@ static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
 static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_camera *camera,
                                gbt_error *err)
 {
-    trace_settings settings = t->settings;
-    settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
-    GBT_TRY(frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, true, err));
+    GBT_TRY(step_view_draw(t, v, view, camera, true, err));
     const unsigned char *valid;
     image_loss_result loss;
     float matrix[AFFINE_NUMBERS];
@@ -80,9 +77,6 @@ static gbt_status align_view(trainer *t, step_view *v, size_t view, gbt_error *e
 gbt_status align_held_out(trainer *t, gbt_error *err)
 {
     step_view *v = &t->views[0]; /* its memory is free between steps */
-    v->frame.draw.pixel_step = 1;
-    v->frame.draw.renderer = t->renderer;
-    v->frame.draw.one_start = false;
     for (size_t i = 0; i < t->scene.view_count; i++)
         if (t->scene.views[i].is_test)
             GBT_TRY(align_view(t, v, i, err));

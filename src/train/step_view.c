@@ -171,6 +171,17 @@ float step_view_near(const trainer *t, const step_view *v)
     return view_near(t->settings.t_near, &t->def, &t->scene.views[t->train_views[v->slot]]);
 }
 
+gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt_camera *camera, bool adjoint,
+                          gbt_error *err)
+{
+    trace_settings settings = t->settings;
+    settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
+    v->frame.draw.pixel_step = 1;
+    v->frame.draw.renderer = t->renderer;
+    v->frame.draw.one_start = false;
+    return frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, adjoint, err);
+}
+
 /* Does the step trade exactness for speed? */
 static bool is_loose(const trainer *t, double progress)
 {

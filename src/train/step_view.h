@@ -79,6 +79,11 @@ void step_view_run(trainer *t, step_view *v);
 gbt_status step_view_compare(step_view *v, const unsigned char *valid, const float *matrix,
                              image_loss_result *loss, double d_matrix[AFFINE_NUMBERS], gbt_error *err);
 
+/** Draw what `camera` sees of the photo of `view`, with every pixel and to its own near distance, into
+ * v->frame. */
+gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt_camera *camera, bool adjoint,
+                          gbt_error *err);
+
 /** Nothing nearer to the camera of its photo is drawn. */
 float step_view_near(const trainer *t, const step_view *v);
 

@@ -14,7 +14,6 @@
 #include "cluster/cluster.h"
 #include "train/align.h"
 #include "train/growing.h"
-#include "train/near.h"
 #include "train/step_exchange.h"
 #include "train/step_rows.h"
 
@@ -248,13 +247,7 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         unsigned char *marks = NULL;
         const unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
-        t->views[0].frame.draw.pixel_step = 1;
-        t->views[0].frame.draw.renderer = t->renderer;
-        t->views[0].frame.draw.one_start = false;
-        trace_settings settings = t->settings;
-        settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[i]);
-        status = frame_render(&t->views[0].frame, frame_neural(&t->anchors, &t->decoder), &camera, &settings,
-                              false, err);
+        status = step_view_draw(t, &t->views[0], i, &camera, false, err);
         if (status == GBT_OK)
             status =
                 scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &marks, err);

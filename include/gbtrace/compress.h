@@ -38,7 +38,9 @@ gbt_compress_def gbt_compress_def_default(void);
  * @param run [in] RUN (a folder with model.gbt) or a model file
  * @param out [in] written atomically; may be the model itself
  * @param report [in] open stream for the table of bytes; NULL: none
- * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * SIGINT and SIGTERM stop it with GBT_ERR_INTERRUPTED; the model is whole then, large or small.
+ *
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  *
  * Threads: same bytes for every thread count. Cost: 64 views with their adjoint, and about 40 us per anchor.
  */

@@ -34,6 +34,7 @@ void stop_signal_release(const stop_signal_guard *guard)
 {
     sigaction(SIGINT, &guard->old_int, NULL);
     sigaction(SIGTERM, &guard->old_term, NULL);
+    seen = 0;
 }
 
 bool stop_signal_seen(void) { return seen != 0; }

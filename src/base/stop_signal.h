@@ -20,6 +20,6 @@ typedef struct stop_signal_guard {
 void stop_signal_catch(stop_signal_guard *guard, void (*wake)(void *context), void *context);
 void stop_signal_release(const stop_signal_guard *guard); /* who handled them before does again */
 
-bool stop_signal_seen(void); /* since stop_signal_catch(); any thread */
+bool stop_signal_seen(void); /* between stop_signal_catch() and stop_signal_release(); any thread */
 
 #endif

@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "data/json_out.h"
 #include "run/run_sensitivity.h"
@@ -58,6 +59,11 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
     return loaded_run_open(run, def->data, 0, r, err);
 }
 
+static gbt_status check_stop(gbt_error *err)
+{
+    return stop_signal_seen() ? base_fail(err, GBT_ERR_INTERRUPTED, MAKING_SMALL_STOPPED) : GBT_OK;
+}
+
 static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def *def, const char *out,
                            compression *c, gbt_error *err)
 {
@@ -73,6 +79,8 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
             status = model_steps_at(&r->model, &s, def->quality, &steps, err);
     }
     const double probed = clock_wall();
+    if (status == GBT_OK)
+        status = check_stop(err);
     if (status == GBT_OK)
         status = model_save_coded(out, &r->model, def->lossless ? NULL : &steps, &c->after, err);
     const double coded = clock_wall();
@@ -222,12 +230,17 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
         status = save_report(&c, def, err);
     loaded_run_close(r);
     mem_free(r);
-    return status;
+    return status == GBT_OK ? check_stop(err) : status; /* what follows shall not begin */
 }
 
 /* One process does it for all. */
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err)
 {
-    return cluster_follow(cluster_leads() ? compress(run, def, out, report, err) : GBT_OK, err);
+    stop_signal_guard guard;
+    stop_signal_catch(&guard, NULL, NULL);
+    const gbt_status status =
+        cluster_follow(cluster_leads() ? compress(run, def, out, report, err) : GBT_OK, err);
+    stop_signal_release(&guard);
+    return status;
 }

@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/rng.h"
+#include "base/stop_signal.h"
 
 enum { VIEWS_MAX = 64, SEED = 11 };
 
@@ -51,7 +52,9 @@ static gbt_status add_views(loaded_run *r, size_t count, model_sensitivity *out,
     for (size_t view = 0; view < r->scene.view_count && status == GBT_OK; view++) {
         if (r->scene.views[view].is_test)
             continue;
-        if ((training + 1) * wanted / count > training * wanted / count) /* `wanted` of `count`, evenly */
+        if (stop_signal_seen())
+            status = base_fail(err, GBT_ERR_INTERRUPTED, MAKING_SMALL_STOPPED);
+        else if ((training + 1) * wanted / count > training * wanted / count) /* `wanted` of `count`, evenly */
             status = add_view(r, view, &p, out, err);
         training++;
     }

@@ -6,11 +6,15 @@
 #include "io/model_steps.h"
 #include "run/loaded_run.h"
 
+#define MAKING_SMALL_STOPPED                                                                                 \
+    "stopped while the model was made small (compress, or resume of a training, does it again)"
+
 /**
  * Sensitivities of the run's model (io/model_steps.h), from its training cameras alone: photos are not read.
  *
  * Renders at most 64 of the views, spread over all, at half the run's resolution, with one adjoint pass each.
- * Without training views: the guess.
+ * Without training views: the guess. Between stop_signal_catch() and stop_signal_release() a signal ends it
+ * with GBT_ERR_INTERRUPTED.
  *
  * @param out [out] free with model_sensitivity_free(), after failure too
  * Threads: same bits for every thread count.

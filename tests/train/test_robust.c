@@ -9,6 +9,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "data/colmap_write.h"
+#include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 #include "io/container.h"
 #include "io/model_file.h"
@@ -751,6 +752,27 @@ static void signal_at_warning(const gbt_event *event, void *context)
 }
 
 /* The warning, that poses of training are not there, comes when the run is opened. */
+static void making_small_stops_at_a_signal(void **state)
+{
+    (void)state;
+    const char *run = in_root("large");
+    const gbt_compress_def small = gbt_compress_def_default();
+    gbt_train_def def = run_def();
+    def.iterations = 3;
+    def.refine_poses = true;
+    train_ok(tiny, run, &def);
+    assert_int_equal(remove(joined(run, "poses.json")), 0);
+    gbt_error err = {0};
+    gbt_listen(signal_at_warning, NULL);
+    assert_int_equal(gbt_compress(run, &small, in_root("small.gbt"), NULL, &err), GBT_ERR_INTERRUPTED);
+    be_quiet();
+    assert_string_equal(err.text, "stopped while the model was made small (compress, or resume of a "
+                                  "training, does it again)");
+    assert_false(file_exists(in_root("small.gbt")));
+    assert_ok(gbt_compress(run, &small, in_root("small.gbt"), NULL, NULL));
+}
+
+/* The warning, that poses of training are not there, comes when the run is opened. */
 static void scoring_stops_at_a_signal(void **state)
 {
     (void)state;
@@ -790,6 +812,7 @@ int main(void)
         cmocka_unit_test(exposures_stay_centred),
         cmocka_unit_test(exposure_is_learned),
         cmocka_unit_test(exposure_resumes_to_the_same_bits),
+        cmocka_unit_test(making_small_stops_at_a_signal),
         cmocka_unit_test(scoring_stops_at_a_signal),
     };
     return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);

@@ -15,6 +15,8 @@ typedef struct gbt_compress_def {
     double quality; /* dB: what the pictures of the model may differ from before, as a PSNR; [20, 90]. Default
                        60 */
     bool lossless;  /* every bit of the model is kept; `quality` is not used. Default false */
+    bool unless_lossless; /* a run that was trained with `lossless` (gbt_train_def) stays as it is. Default
+                             false */
     const char *data; /* data set whose training cameras tell what counts; NULL: the one it was trained on.
                          Default NULL */
     const char *json; /* also write the figures here; NULL: nowhere. Default NULL */

@@ -81,6 +81,8 @@ typedef struct gbt_train_def {
                        budget, give the run another length: schedules go on where a run of that length would
                        be */
     bool overwrite; /* train anew in a folder that holds a run, which is lost once the data have been read */
+    bool lossless; /* nothing but a setting of the run: gbt_compress() with `unless_lossless` leaves its model
+                      as it is. With `resume`, true makes it so from now on */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
                                                     stops meanwhile */
     int eval_at_count;

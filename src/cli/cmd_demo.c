@@ -79,7 +79,7 @@ static int run(const operands *given)
     }
     if (status == GBT_OK) {
         progress_say("3/3 scoring the held-out views");
-        status = finish_run(run_folder, false, false, &err);
+        status = finish_run(run_folder, false, &err);
     }
     if (status == GBT_OK)
         finish_run_say(run_folder);

@@ -8,7 +8,6 @@
 
 static gbt_train_def def;
 static const char *output, *eval_at;
-static bool lossless;
 
 static const option own_rows[] = {
     {.name = "output",
@@ -25,12 +24,6 @@ static const option own_rows[] = {
      .value_name = "DATA",
      .help = "the same as DATA",
      .aliases = "data",
-     .rare = true},
-    {.name = "lossless",
-     .kind = OPTION_FLAG,
-     .value = &lossless,
-     .help = "store the model without loss (see compress); the file is about seven times larger; not kept "
-             "with the run: with --resume it is named again",
      .rare = true},
     {.name = "eval",
      .kind = OPTION_STRING,
@@ -69,7 +62,7 @@ static int run(const operands *given)
     if (status == GBT_OK)
         status = gbt_set_memory(def.memory, output, &err);
     if (status == GBT_OK)
-        status = finish_run(output, lossless, def.tensorboard, &err);
+        status = finish_run(output, def.tensorboard, &err);
     if (status == GBT_OK)
         status = options_memory_kept(def.memory, &err);
     if (status == GBT_OK)

@@ -9,12 +9,13 @@
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 
-gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err)
+gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
 {
     char model[4096];
     gbt_status status = GBT_OK;
-    if (!lossless && snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
-        const gbt_compress_def small = gbt_compress_def_default();
+    if (snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
+        gbt_compress_def small = gbt_compress_def_default();
+        small.unless_lossless = true;
         status = gbt_compress(run, &small, model, NULL, err);
     }
     gbt_evaluate_def score = gbt_evaluate_def_default();

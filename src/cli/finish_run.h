@@ -8,10 +8,10 @@
 #include "gbtrace/status.h"
 
 /**
- * Make RUN/model.gbt small, unless `lossless`; then score the held-out views with what it gives back, and
- * write the report; with `tensorboard`, scores and pictures for it too.
+ * Make RUN/model.gbt small, unless the run is lossless; then score the held-out views with what it gives
+ * back, and write the report; with `tensorboard`, scores and pictures for it too.
  */
-gbt_status finish_run(const char *run, bool lossless, bool tensorboard, gbt_error *err);
+gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err);
 
 /** Say on stdout where the report is and what shows the scene, to a person (progress_for_people()). */
 void finish_run_say(const char *run);

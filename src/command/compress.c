@@ -16,6 +16,7 @@
 #include "data/json_out.h"
 #include "run/run_sensitivity.h"
 #include "io/model_code.h"
+#include "train/config.h"
 
 gbt_compress_def gbt_compress_def_default(void)
 {
@@ -30,6 +31,22 @@ typedef struct compression {
     const char *steps_from;
     bool kept; /* the file was small already: copied */
 } compression;
+
+/* Whether RUN's own settings say that its model stays as it was trained. */
+static gbt_status find_wish(const char *run, bool *lossless, gbt_error *err)
+{
+    char path[4096];
+    unsigned char *text = NULL;
+    size_t size;
+    gbt_train_def settings = gbt_train_def_default();
+    config_strings strings;
+    GBT_TRY(file_join(path, sizeof path, run, "config", err));
+    GBT_TRY(file_read(path, &text, &size, err));
+    const gbt_status status = config_parse((const char *)text, path, &settings, &strings, err);
+    *lossless = settings.lossless;
+    mem_free(text);
+    return status;
+}
 
 /* The model file of RUN, or the file itself. */
 static gbt_status find_model(const char *run, char *path, size_t size, gbt_error *err)
@@ -212,7 +229,11 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
         GBT_TRY(file_check_creatable(def->json, err));
     compression c = {0};
     char path[4096];
-    bool has_views = false;
+    bool has_views = false, stays = false;
+    if (def->unless_lossless)
+        GBT_TRY(find_wish(run, &stays, err));
+    if (stays)
+        return GBT_OK;
     GBT_TRY(find_model(run, path, sizeof path, err));
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
     if (r == NULL)

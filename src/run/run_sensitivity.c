@@ -54,7 +54,8 @@ static gbt_status add_views(loaded_run *r, size_t count, model_sensitivity *out,
             continue;
         if (stop_signal_seen())
             status = base_fail(err, GBT_ERR_INTERRUPTED, MAKING_SMALL_STOPPED);
-        else if ((training + 1) * wanted / count > training * wanted / count) /* `wanted` of `count`, evenly */
+        else if ((training + 1) * wanted / count > training * wanted / count) /* `wanted` of `count`, evenly
+                                                                               */
             status = add_view(r, view, &p, out, err);
         training++;
     }

@@ -130,6 +130,7 @@ gbt_status resume_open(trainer *t, const char *data, const char *run, const char
         if (gbt_train_setting_at(i)->saved)
             setting_set_default(gbt_train_setting_at(i), &saved);
     GBT_TRY(config_parse(config, path, &saved, strings, err));
+    saved.lossless = saved.lossless || def->lossless; /* of the file, not of what is trained */
     warn_of_differences(def, &saved);
     const char *named = saved.eval_split; /* which its files say, wherever the list is now */
     char split[RUN_SPLIT_TEXT_SIZE];

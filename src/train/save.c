@@ -48,6 +48,7 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
     snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
     /* A run on a budget is told by its pace, so that a repetition by --pace writes the same file. */
     gbt_train_def def = t->def;
+    def.lossless = false; /* says nothing of this file */
     char text[PACE_TEXT_SIZE];
     if (def.iterations == 0 && t->pace.known == PACE_SEGMENTS) {
         pace_text(&t->pace, text);

@@ -125,6 +125,8 @@ static const gbt_train_setting settings[] = {
              "another "
              "budget to that length in all, also when it was finished"},
     {NAMED("overwrite", overwrite), FLAG, .help = "train anew in a folder that holds a run, which is lost"},
+    {NAMED("lossless", lossless), FLAG, .saved = true, .if_changed = true, .rare = true,
+     .help = "store the model without loss (see compress); the file is about seven times larger"},
     {NAMED("memory", memory), RANGE(BYTES, 0, 0x1p60, "BYTES"),
      .help = "memory to take at most, such as 4G (docs/memory.md); does not change the result; 0: no limit"},
     {NAMED("hit-bytes-max", hit_bytes_max), RANGE(BYTES, 0, 0x1p60, "BYTES"), .rare = true, .number = 0x1p60,

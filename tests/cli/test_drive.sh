@@ -49,6 +49,15 @@ report $? "quiet" "$(cat err)"
 "$program" train --config run/config -o again 2>err && cmp run/model.gbt again/model.gbt >>err 2>&1
 report $? "RUN/config repeats a run" "$(cat err)"
 
+# ---- the form of its file is a setting, too
+"$program" train made -o whole --iterations 20 --stop-at-step 10 --lossless >out 2>&1
+grep -q '^lossless = 1$' whole/config && "$program" train -o whole --resume >out 2>&1 && "$program" train --config whole/config -o whole-again >>out 2>&1 &&
+    cmp whole/model.gbt whole-again/model.gbt >>out && [ "$(wc -c <whole/model.gbt)" -gt $((2 * $(wc -c <run/model.gbt))) ]
+report $? "a lossless run stays so when it is resumed or repeated" "$(cat out whole/config; ls -l whole run)"
+"$program" train made -o small --iterations 20 >out 2>&1 && ! grep -q lossless small/config && "$program" train -o small --resume --lossless >out 2>&1 &&
+    cmp small/model.gbt whole/model.gbt >>out && ! grep -q 'own settings' out && "$program" train -o small --resume >out 2>&1 && cmp small/model.gbt whole/model.gbt >>out
+report $? "a run that is to be lossless from now on" "$(cat out small/config)"
+
 # ---- a terminal: lines are written over, unless it cannot, or is none
 on_terminal() { # command
     python3 -c 'import pty, sys; sys.exit(pty.spawn(sys.argv[1:]))' "$@" >seen 2>&1 </dev/null

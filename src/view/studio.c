@@ -62,12 +62,19 @@ static gbt_status reopen(studio *s, const struct stat *file, gbt_error *err)
     return GBT_OK;
 }
 
+static int64_t microseconds_now(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
+}
+
 gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err)
 {
     struct stat file;
     bool exists;
     char config[4096];
-    *out = (studio){.input = input, .data = data};
+    *out = (studio){.input = input, .data = data, .started = microseconds_now()};
     const bool folder = file_is_folder(input);
     if (folder) {
         GBT_TRY(file_join(out->model_path, sizeof out->model_path, input, "model.gbt", err));
@@ -118,9 +125,10 @@ char *studio_status(const studio *s)
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     json_t *note = json_text(s->note);
-    json_t *status = json_pack("{s:i,s:I,s:f,s:o?}", "version", (int)s->version, "log_bytes",
-                               has_log ? (json_int_t)log.st_size : (json_int_t)0, "log_age",
-                               has_log ? (double)(now.tv_sec - log.st_mtim.tv_sec) : -1.0, "note", note);
+    json_t *status =
+        json_pack("{s:I,s:i,s:I,s:f,s:o?}", "started", (json_int_t)s->started, "version", (int)s->version,
+                  "log_bytes", has_log ? (json_int_t)log.st_size : (json_int_t)0, "log_age",
+                  has_log ? (double)(now.tv_sec - log.st_mtim.tv_sec) : -1.0, "note", note);
     if (status != NULL && s->run != NULL) {
         json_object_set_new(status, "iterations", json_integer((json_int_t)s->run->model.iterations));
         json_object_set_new(status, "anchors", json_integer((json_int_t)s->run->model.anchors.count));

@@ -27,6 +27,7 @@ typedef struct studio {
     gbt_renderer trained;                  /* what the model was trained to be drawn with, and in front of */
     float background[3];
     loaded_run *run;         /* NULL: nothing has been saved yet */
+    int64_t started;         /* microseconds: tells a page that another viewer answers it now */
     unsigned version;        /* 1, 2, ... counts what was opened */
     char note[600];          /* for people: why there is no picture, or no photo; empty: all is well */
     const atomic_bool *stop; /* optional (NULL): once true a picture that is being traced is given up;

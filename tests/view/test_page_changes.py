@@ -25,6 +25,16 @@ def another_viewer(page, path):
     page.wait("!gbtrace.training.gone")
 
 
+def unseen_viewer(page, path):
+    """The same between two polls of the page."""
+    port = page.address.rstrip("/").rpartition(":")[2]
+    page.run("gbtrace.training.poll = () => { gbtrace.training.waits = true; }")
+    page.wait("gbtrace.training.waits")
+    stop(page.server)
+    page.server, _ = start(path, port=port)
+    page.run("delete gbtrace.training.poll; gbtrace.training.poll()")
+
+
 def other_photos(work):
     """Fewer, then more of them; and the log is the other run's, from its begin."""
     with open(work + "/run_few/log.csv", "a", encoding="utf-8") as log:
@@ -38,6 +48,10 @@ def other_photos(work):
             size = page.run("[document.getElementById('photo').width, gbtrace.look.scene.views[gbtrace.look.view].width]")
             check(path + ": a photo of it is shown", size[0] == size[1] and page.run("document.getElementById('message').hidden"), str(size))
             page.wait(f"gbtrace.training.rows.length === {rows}")
+        check("one row is a dot", page.run("document.querySelectorAll('#chart circle.train').length") == 1)
+        unseen_viewer(page, work + "/run_few")
+        page.wait(f"gbtrace.look.scene.views.length === 4 && gbtrace.training.rows.length === 4 && {STILL}")
+        check("a viewer that was started again between two polls is noticed", page.run("document.querySelectorAll('#chart circle.train').length") == 0)
         page.press("KeyF", "f")
         page.wait(STILL)
         page.errors = []  # of the time between them

@@ -22,14 +22,15 @@ export class Training {
     async poll() {
         try {
             const status = await (await fetch("status")).json();
-            if (this.gone)
+            const isAnother = this.gone || status.started !== this.started;
+            if (isAnother)
                 this.forget(); // a server that was started again may show another run
             this.live.hidden = !(status.log_age >= 0 && status.log_age < liveSeconds);
             if (status.log_bytes !== this.bytes)
                 await this.readLog();
             this.describe(status);
-            if (status.version !== this.version || status.note !== this.note || this.gone) {
-                this.version = status.version, this.note = status.note;
+            if (status.version !== this.version || status.note !== this.note || isAnother) {
+                this.version = status.version, this.note = status.note, this.started = status.started;
                 this.changed(status);
             }
             this.gone = false;
@@ -74,7 +75,7 @@ export class Training {
     draw() {
         const rows = this.rows.filter(r => r.train_psnr > 0), left = 26, right = 278, top = 6, bottom = 94;
         this.chart.replaceChildren();
-        if (rows.length < 2)
+        if (rows.length === 0)
             return;
         const values = rows.flatMap(r => r.test_psnr > 0 ? [r.train_psnr, r.test_psnr] : [r.train_psnr]);
         const low = Math.floor(Math.min(...values)), high = Math.max(low + 1, Math.ceil(Math.max(...values))), last = rows[rows.length - 1].step;
@@ -100,6 +101,8 @@ export class Training {
             points.push(`${x(some[some.length - 1].step).toFixed(1)},${y(some.reduce((s, r) => s + r.train_psnr, 0) / some.length).toFixed(1)}`);
         }
         put("polyline", { class: "train", points: points.join(" ") });
+        if (rows.length === 1) // a line of one point shows nothing
+            put("circle", { class: "train", cx: x(last), cy: y(rows[0].train_psnr), r: 2 });
         for (const r of rows)
             if (r.test_psnr > 0)
                 put("circle", { class: "test", cx: x(r.step), cy: y(r.test_psnr), r: 3 });

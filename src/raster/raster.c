@@ -143,7 +143,8 @@ typedef struct pass {
     bool keep_tape;
     image *rgb;
     float *transmittance;
-    const image *d_rgb; /* NULL: forward */
+    const image *d_rgb;      /* NULL: forward */
+    const atomic_bool *stop; /* raster_scene.stop */
     atomic_bool failed;
 } pass;
 
@@ -204,6 +205,11 @@ static void look_behind(const tile_job *job)
     }
 }
 
+static bool is_stopped(const pass *p)
+{
+    return p->stop != NULL && atomic_load_explicit(p->stop, memory_order_relaxed);
+}
+
 static void run_tile(size_t index, size_t begin, size_t end, void *context)
 {
     (void)begin;
@@ -214,7 +220,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     const bool tape = p->d_rgb != NULL || p->keep_tape;
     tile_pixels pixels;
     ray_scratch scratch = {0};
-    if (atomic_load_explicit(&p->failed, memory_order_relaxed))
+    if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p))
         return;
     memset(state->d_background[index], 0, sizeof *state->d_background);
     tile_job job = {.view = &state->view,
@@ -248,6 +254,8 @@ static gbt_status run_pass(pass *p, gbt_error *err)
                         sizeof *state->d_background, "raster tiles", err));
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
+    if (is_stopped(p))
+        return base_fail(err, GBT_ERR_INTERRUPTED, "raster: stopped");
     if (atomic_load(&p->failed))
         return base_fail(err, GBT_ERR_NO_MEMORY, "raster: no memory for the hits of a %d x %d image",
                          state->view.width, state->view.height);
@@ -287,7 +295,11 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
         GBT_TRY(mem_reserve((void **)&state->blocks, &state->blocks_capacity, 0, state->lists.pair_count,
                             sizeof *state->blocks, "raster tape", err));
     }
-    pass p = {.state = state, .keep_tape = keep_tape, .rgb = rgb, .transmittance = transmittance};
+    pass p = {.state = state,
+              .keep_tape = keep_tape,
+              .rgb = rgb,
+              .transmittance = transmittance,
+              .stop = scene->stop};
     GBT_TRY(run_pass(&p, err));
     state->tape_kept = keep_tape;
     if (counters != NULL)
@@ -308,7 +320,7 @@ gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d
     const size_t floats = state->lists.pair_count * raster_sum_count(view->settings.form);
     GBT_TRY(mem_reserve((void **)&state->records, &state->record_capacity, 0, floats, sizeof *state->records,
                         "raster gradients", err));
-    pass p = {.state = state, .d_rgb = d_rgb};
+    pass p = {.state = state, .d_rgb = d_rgb, .stop = scene->stop};
     GBT_TRY(run_pass(&p, err));
     for (int c = 0; c < 3 && d_background != NULL; c++) {
         d_background[c] = 0;

@@ -10,6 +10,7 @@
 #ifndef GBT_RASTER_RASTER_H
 #define GBT_RASTER_RASTER_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -47,6 +48,7 @@ typedef struct raster_counters {
 /** The last view and the memory of passes, reused from view to view. Start from {0}. */
 typedef struct raster_scene {
     struct raster_state *state; /* internal */
+    const atomic_bool *stop; /* optional (NULL): once true a pass ends with GBT_ERR_INTERRUPTED; borrowed */
 } raster_scene;
 
 /** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE, standing still. */

@@ -30,7 +30,7 @@ typedef struct studio {
     int64_t started;         /* microseconds: tells a page that another viewer answers it now */
     unsigned version;        /* 1, 2, ... counts what was opened */
     char note[600];          /* for people: why there is no picture, or no photo; empty: all is well */
-    const atomic_bool *stop; /* optional (NULL): once true a picture that is being traced is given up;
+    const atomic_bool *stop; /* optional (NULL): once true a picture that is being drawn is given up;
                                 borrowed */
     studio_picture last;
     bool drawn; /* the frame's picture is that of `last` too, not the tree alone */

@@ -10,7 +10,7 @@ void studio_answer(studio *s, const request *what, answer *out)
         answer_text(out, 503, "text/plain; charset=utf-8", s->note);
         return;
     }
-    s->run->frame.scene.stop = s->stop;
+    s->run->frame.scene.stop = s->run->frame.splats.stop = s->stop;
     if (what->kind == REQUEST_SCENE)
         status = studio_scene(s, out, &err);
     else if (what->kind == REQUEST_PICK)

@@ -437,6 +437,13 @@ static void wrong_arguments(void **state)
     assert_ok(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL));
     assert_int_equal(raster_backward(&scene, &small, &d, NULL, NULL, NULL), GBT_ERR_ARGUMENT);
     assert_ok(raster_backward(&scene, &rgb, &d, NULL, NULL, NULL));
+    /* Nobody wants the picture any more; the next one is drawn. */
+    const atomic_bool stopped = true;
+    scene.stop = &stopped;
+    assert_int_equal(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL),
+                     GBT_ERR_INTERRUPTED);
+    scene.stop = NULL;
+    assert_ok(raster_forward(&scene, &g, &camera, &s, true, &rgb, NULL, NULL, NULL));
     raster_scene_free(&scene);
     raster_scene_free(&scene); /* twice is fine */
     image_free(&rgb);

@@ -386,9 +386,7 @@ static void a_signal_ends_what_is_made(void **state)
     raise(SIGINT);
     while (!atomic_load(server_nobody_waits(s)))
         usleep(10000);
-    stop_signal_release(&signals);
-    stop_signal_catch(&signals, NULL, NULL); /* forgets it */
-    stop_signal_release(&signals);
+    stop_signal_release(&signals); /* forgets it */
     answer_with(s, job, "given up");
     expect(fd, 200, "given up");
 }

@@ -27,7 +27,11 @@ static gbt_status find_checkpoint(const char *latest, const char *previous, cons
         return base_fail(err, status, "%s", first.text);
     log_warn("%s; going on from %s", first.text, previous);
     *path = previous;
-    return checkpoint_config(previous, config, CONFIG_TEXT_SIZE, err);
+    GBT_TRY(checkpoint_config(previous, config, CONFIG_TEXT_SIZE, err));
+    /* Or the next save would put the damaged one in the place of the only whole one. */
+    if (status == GBT_ERR_FORMAT && rename(previous, latest) == 0)
+        *path = latest;
+    return GBT_OK;
 }
 
 /* The length of the run is asked for on purpose: change_length() takes it. */

@@ -925,6 +925,12 @@ static void a_damaged_checkpoint_is_refused(void **state)
     }
     /* With an older one beside it, that one is used. */
     write_file(in_root("damaged/checkpoints/last.gbt.prev"), whole.data, whole.count);
+    on.stop_at_step = 6;
+    train_fails(tiny, in_root("damaged"), &on, GBT_ERR_INTERRUPTED, "after step 6");
+    bytes kept = read_bytes(in_root("damaged/checkpoints/last.gbt.prev")); /* not the damaged one */
+    assert_int_equal(kept.count, whole.count);
+    assert_memory_equal(kept.data, whole.data, whole.count);
+    mem_free(kept.data);
     resume_ok(in_root("damaged"));
     assert_same_file(straight_run(), in_root("damaged/model.gbt"));
     mem_free(whole.data);

@@ -58,6 +58,12 @@ report $? "a lossless run stays so when it is resumed or repeated" "$(cat out wh
     cmp small/model.gbt whole/model.gbt >>out && ! grep -q 'own settings' out && "$program" train -o small --resume >out 2>&1 && cmp small/model.gbt whole/model.gbt >>out
 report $? "a run that is to be lossless from now on" "$(cat out small/config)"
 
+# ---- a run without scores
+"$program" train made -o unscored --iterations 20 --stop-at-step 1 >out 2>&1
+"$program" report unscored >>out 2>&1
+[ $? = 4 ] && tail -n 1 out | grep -q 'no scores yet (gbtrace eval makes them)'
+report $? "a report before there are scores" "$(cat out)"
+
 # ---- a terminal: lines are written over, unless it cannot, or is none
 on_terminal() { # command
     python3 -c 'import pty, sys; sys.exit(pty.spawn(sys.argv[1:]))' "$@" >seen 2>&1 </dev/null

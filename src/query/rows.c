@@ -101,7 +101,8 @@ static void take_vertex(void *context, const double *values)
         job->status = add_row(job->out, values, job->err);
 }
 
-static gbt_status read_ply(const source_file *file, size_t most, query_rows *out, gbt_error *err)
+static gbt_status read_ply(const source_file *file, size_t least, size_t most, query_rows *out,
+                           gbt_error *err)
 {
     ply_header header;
     GBT_TRY(ply_read_header(file, &header, err));
@@ -112,6 +113,10 @@ static gbt_status read_ply(const source_file *file, size_t most, query_rows *out
         columns[i] = vertex >= 0 ? ply_find_property(&header, vertex, names[i]) : -1;
     if (columns[0] < 0 || columns[1] < 0 || columns[2] < 0)
         return base_fail(err, GBT_ERR_FORMAT, "%.400s: no vertices with x y z", file->name);
+    if (least > 4)
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%.400s: vertices have no direction (wanted lines of %zu numbers)", file->name,
+                         least);
     out->width = columns[3] >= 0 && most >= 4 ? 4 : 3;
     ply_job job = {out, GBT_OK, err};
     GBT_TRY(ply_read_rows(file, &header, vertex, columns, out->width, take_vertex, &job, err));
@@ -125,7 +130,7 @@ gbt_status query_rows_read(const char *path, size_t least, size_t most, query_ro
     GBT_TRY(file_read(path, &bytes, &size, err));
     const gbt_status status =
         query_ends_with(path, ".ply")
-            ? read_ply(&(source_file){.name = path, .bytes = bytes, .size = size}, most, out, err)
+            ? read_ply(&(source_file){.name = path, .bytes = bytes, .size = size}, least, most, out, err)
             : query_rows_parse(path, (const char *)bytes, size, least, most, out, err);
     mem_free(bytes);
     return status;

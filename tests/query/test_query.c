@@ -267,6 +267,9 @@ static void files_of_balls_and_queries(void **state)
         def.at = NULL;
     }
     gbt_error err = {0};
+    def.from = ply;
+    assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT, "vertices have no direction");
+    err = (gbt_error){0};
     def = gbt_query_def_default();
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT, "at, from: neither");
     err = (gbt_error){0};

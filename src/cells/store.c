@@ -252,16 +252,17 @@ static gbt_status add_batch(sorting *s, size_t rows, gbt_error *err)
 }
 
 /* As loaded_run_take_cloud(): coordinates are around the middle of the means. */
-static void make_local(cell_store *store)
+static void make_local(sorting *s)
 {
+    cell_store *store = s->store;
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     for (size_t i = 0; i < store->chunk_count; i++)
         for (int k = 0; k < 3 && store->chunks[i].count > 0; k++) {
             low[k] = fmin(low[k], (double)store->chunks[i].low[k]);
             high[k] = fmax(high[k], (double)store->chunks[i].high[k]);
         }
-    for (int k = 0; k < 3; k++)
-        store->origin[k] = store->middle[k] = 0.5 * (low[k] + high[k]);
+    gaussian_middle(s->sample, s->sample_count, low, high, store->middle);
+    memcpy(store->origin, store->middle, sizeof store->origin);
     for (size_t i = 0; i < store->chunk_count; i++)
         for (int k = 0; k < 3 && store->chunks[i].count > 0; k++) {
             store->chunks[i].low[k] = (float)((double)store->chunks[i].low[k] - store->middle[k]);
@@ -330,7 +331,7 @@ gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, s
     if (status == GBT_OK)
         status = sort_rows(s, err);
     if (status == GBT_OK)
-        make_local(out);
+        make_local(s);
     release(s);
     mem_free(s);
     return status;

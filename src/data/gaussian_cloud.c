@@ -3,8 +3,10 @@
 #include "data/gaussian_cloud.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/raw.h"
@@ -86,6 +88,23 @@ bool gaussian_limit_scales(float scale_log[3])
         scale_log[k] = fmaxf(scale_log[k], least);
     }
     return changed;
+}
+
+void gaussian_middle(const float *mean, size_t count, const double low[3], const double high[3],
+                     double middle[3])
+{
+    enum { SAMPLE = 1024 };
+    const size_t taken = count < SAMPLE ? count : SAMPLE;
+    for (size_t k = 0; k < 3; k++) {
+        float sample[SAMPLE];
+        middle[k] = 0.5 * (low[k] + high[k]);
+        for (size_t i = 0; i < taken; i++)
+            sample[i] = mean[3 * (i * count / taken) + k];
+        if (taken == 0)
+            continue;
+        qsort(sample, taken, sizeof *sample, compare_floats);
+        middle[k] = fmin(fmax(middle[k], (double)sample[taken / 4]), (double)sample[taken - 1 - taken / 4]);
+    }
 }
 
 float gaussian_cloud_near(double said) { return said > 0 && said < 1e30 ? (float)said : 0; }

@@ -63,6 +63,14 @@ typedef struct gaussian_row {
  */
 void gaussian_cloud_add(gaussian_cloud *out, const gaussian_row *row);
 
+/**
+ * Where coordinates start from, so that floats are fine for the Gaussians: the middle of the bounds low and
+ * high, but between the quartiles of the means along each axis, so that a few far ones do not take the
+ * others' digits. `mean`: all [count][3], or a sample.
+ */
+void gaussian_middle(const float *mean, size_t count, const double low[3], const double high[3],
+                     double middle[3]);
+
 /** The near distance that a file says; 0 where it is not usable. */
 float gaussian_cloud_near(double said);
 

@@ -58,10 +58,12 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
         low[i % 3] = fmin(low[i % 3], (double)c->mean[i]);
         high[i % 3] = fmax(high[i % 3], (double)c->mean[i]);
     }
+    double middle[3];
+    gaussian_middle(c->mean, c->count, low, high, middle);
     for (size_t i = 0; i < 3 * c->count; i++)
-        c->mean[i] = (float)((double)c->mean[i] - 0.5 * (low[i % 3] + high[i % 3]));
+        c->mean[i] = (float)((double)c->mean[i] - middle[i % 3]);
     for (int k = 0; k < 3; k++) {
-        r->model.origin[k] = c->origin[k] + 0.5 * (low[k] + high[k]);
+        r->model.origin[k] = c->origin[k] + middle[k];
         c->origin[k] = 0;
     }
 }

@@ -69,8 +69,8 @@ void loaded_run_close_views(loaded_run *r);
 /** Draw as plain Gaussians are drawn: on black, as every viewer does. */
 void loaded_run_draw_plain(loaded_run *r);
 
-/** Let `r` show these plain Gaussians, given in world coordinates, around the middle of their bounds, where
-    floats are fine. `cloud` is taken over, and is {0} then. */
+/** Let `r` show these plain Gaussians, given in world coordinates, around gaussian_middle(), where floats are
+    fine. `cloud` is taken over, and is {0} then. */
 void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
 
 void loaded_run_close(loaded_run *r);

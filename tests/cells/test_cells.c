@@ -85,8 +85,7 @@ static void open_both(both *b, gaussian_cloud *cloud)
         low[i % 3] = fmin(low[i % 3], (double)b->cloud.mean[i]);
         high[i % 3] = fmax(high[i % 3], (double)b->cloud.mean[i]);
     }
-    for (int k = 0; k < 3; k++)
-        b->middle[k] = 0.5 * (low[k] + high[k]);
+    gaussian_middle(b->cloud.mean, b->cloud.count, low, high, b->middle);
     for (size_t i = 0; i < 3 * b->cloud.count; i++)
         b->cloud.mean[i] = (float)((double)b->cloud.mean[i] - b->middle[i % 3]);
     assert_ok(cell_store_make(ply, "/tmp", plenty, CHUNK_ROWS, &b->store, NULL));
@@ -247,6 +246,22 @@ static void far_from_the_origin(void **state) /* A5 */
     for (size_t i = 0; i < cloud.count; i++)
         cloud.mean[3 * i] += 40000;
     open_both(&b, &cloud);
+    const gbt_camera camera = camera_at(8, 2, 1);
+    check_same(&b, &camera, rounding);
+    close_both(&b);
+}
+
+/* It must not take the digits of the others' coordinates. */
+static void one_far_from_the_others(void **state)
+{
+    (void)state;
+    both b;
+    gaussian_cloud cloud;
+    random_cloud(&cloud, 900);
+    cloud.mean[3 * 700] = 1e9f;
+    open_both(&b, &cloud);
+    for (size_t k = 0; k < 3; k++)
+        assert_true(fabs(b.store.middle[k]) < 4);
     const gbt_camera camera = camera_at(8, 2, 1);
     check_same(&b, &camera, rounding);
     close_both(&b);
@@ -592,6 +607,7 @@ int main(void)
         cmocka_unit_test(camera_inside),
         cmocka_unit_test(many_in_one_place),
         cmocka_unit_test(far_from_the_origin),
+        cmocka_unit_test(one_far_from_the_others),
         cmocka_unit_test(fog),
         cmocka_unit_test(opaque_stacks),
         cmocka_unit_test(bad_values),

@@ -179,6 +179,29 @@ static void pictures_go_where_they_should(void **state)
     }
 }
 
+/* The others are where they were, although floats around the middle of all are 32 apart. */
+static void one_far_from_the_others(void **state)
+{
+    (void)state;
+    enum { ALL = 8 };
+    static float means[3 * ALL], scales[3 * ALL], quats[4 * ALL], opacities[ALL], colors[3 * ALL],
+        rgb[3 * W * H], depth[W * H];
+    for (size_t i = 0; i < ALL; i++) {
+        means[3 * i + 2] = i == 5 ? 1e9f : 5;
+        quats[4 * i] = 1;
+        opacities[i] = 0.9f;
+        for (size_t k = 0; k < 3; k++)
+            scales[3 * i + k] = -1;
+    }
+    const gbt_gaussians g = {
+        .count = ALL, .mean = means, .scale_log = scales, .quat = quats, .opacity = opacities, .sh = colors};
+    gbt_model *model;
+    assert_ok(gbt_model_from_gaussians(&g, &model, NULL));
+    assert_ok(gbt_model_render(model, &camera, 0, &(gbt_picture){.rgb = rgb, .depth = depth}, NULL));
+    assert_true(fabsf(depth[W * H / 2] - 5) < 1e-4f);
+    gbt_model_close(model);
+}
+
 static void what_is_not_rendered(void **state)
 {
     (void)state;
@@ -235,6 +258,7 @@ int main(void)
                                        cmocka_unit_test(what_can_be_asked),
                                        cmocka_unit_test(settings_are_checked),
                                        cmocka_unit_test(pictures_go_where_they_should),
+                                       cmocka_unit_test(one_far_from_the_others),
                                        cmocka_unit_test(what_is_not_rendered),
                                        cmocka_unit_test(gradients_point_the_right_way)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -12,6 +12,7 @@
 #include "io/container.h"
 #include "io/row_sections.h"
 #include "train/config.h"
+#include "train/widest.h"
 
 enum { NAME_SIZE = 64, PHOTO_END_BYTES = 2048 };
 
@@ -323,7 +324,8 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     t->skipped_steps = counters[3];
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];
-    return read_creation(t, c, path, err);
+    GBT_TRY(read_creation(t, c, path, err));
+    return widest_update(t, err);
 }
 
 gbt_status checkpoint_load(trainer *t, const char *path, gbt_error *err)

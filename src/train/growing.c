@@ -14,6 +14,7 @@
 #include "train/def.h"
 #include "train/camera_sees.h"
 #include "train/near.h"
+#include "train/widest.h"
 
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
@@ -192,6 +193,8 @@ gbt_status growing_round(trainer *t, gbt_error *err)
         status = growth_round(&t->anchors, &t->stats, &def, &result, err);
     if (status == GBT_OK)
         status = follow_all(t, &result, err);
+    if (status == GBT_OK)
+        status = widest_update(t, err);
     mem_free(known.nearest);
     mem_free(known.scale);
     mem_free(result.source);

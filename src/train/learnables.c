@@ -19,7 +19,7 @@ typedef struct rate_rule {
     double own;         /* ours is so many times that */
     bool times_extent;  /* the reference's is proportional to the extent of the cameras */
     bool ages_with_run; /* Adam's bias is corrected by the age of the run, not of the anchor */
-    bool is_log_scale;  /* kept between scale_log_min and scale_log_max */
+    bool is_log_scale;  /* kept between scale_log_min and the anchor's scale_log_max */
 } rate_rule;
 
 /* By the age of the run, the first steps of a new anchor would be up to six times too long, for its second
@@ -109,12 +109,15 @@ typedef struct anchor_job {
     uint64_t age; /* of the run */
 } anchor_job;
 
-FASTEST_CLONE static void keep_between(float *values, size_t count, float least, float most)
+/* `most` of each row; `least` wins. */
+FASTEST_CLONE static void keep_between(float *values, size_t rows, size_t width, float least,
+                                       const float *most)
 {
-    for (size_t i = 0; i < count; i++) { /* fminf() and fmaxf() would be calls */
-        const float above = values[i] > least ? values[i] : least;
-        values[i] = above < most ? above : most;
-    }
+    for (size_t r = 0; r < rows; r++)
+        for (size_t i = r * width; i < (r + 1) * width; i++) { /* fminf() and fmaxf() would be calls */
+            const float below = values[i] < most[r] ? values[i] : most[r];
+            values[i] = below > least ? below : least;
+        }
 }
 
 /* Rows [begin, end), all of one age. */
@@ -131,7 +134,7 @@ static void learn_rows(const anchor_job *job, size_t begin, size_t end)
                   adam_rates_of_views(job->rates->anchor[f], rule->ages_with_run ? job->age : age,
                                       job->rates->views));
         if (rule->is_log_scale)
-            keep_between(values, count, m->scale_log_min, m->scale_log_max);
+            keep_between(values, end - begin, width, m->scale_log_min, m->scale_log_max + begin);
     }
 }
 

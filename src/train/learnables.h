@@ -52,7 +52,8 @@ typedef struct learning_model {
                               */
     decoder *decoder;
     learnables *gradient, *moment1, *moment2;
-    float scale_log_min, scale_log_max; /* every log-scale is kept in here */
+    float scale_log_min;        /* every log-scale is kept above this */
+    const float *scale_log_max; /* [anchors->count]: and those of anchor i below this */
 } learning_model;
 
 /** One Adam step of the networks; `age` >= 1 counts it. Their gradient is 0 afterwards. */

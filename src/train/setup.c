@@ -17,6 +17,7 @@
 #include "train/near.h"
 #include "train/setup_data.h"
 #include "train/trainer.h"
+#include "train/widest.h"
 
 enum { STREAM_NETWORKS = 2 };
 
@@ -111,6 +112,7 @@ static gbt_status make_state(trainer *t, gbt_error *err)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
     if (t->def.refine_poses)
         GBT_TRY(poses_make(&t->poses, &t->scene, t->train_count, t->distance, err));
+    GBT_TRY(widest_update(t, err));
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
@@ -159,7 +161,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
                  t->scene.folder, (double)t->settings.t_near, (double)p5);
     const double size = fmax(t->extent, (double)median);
     t->scale_log_min = (float)log(1e-6 * size);
-    t->scale_log_max = (float)log(100 * size);
+    t->scale_log_limit = (float)log(100 * size);
     return GBT_OK;
 }
 

@@ -275,6 +275,7 @@ void trainer_free(trainer *t)
     for (int i = 0; i < 3; i++)
         learnables_free(kept[i]);
     mem_free(t->created);
+    mem_free(t->scale_log_max);
     decoder_free(&t->decoder);
     growth_stats_free(&t->stats);
     for (size_t i = 0; i < t->view_count; i++)

@@ -55,8 +55,9 @@ struct trainer {
     float voxel_size;
     double distance;                    /* from training cameras to anchors, in the median */
     double extent, first_scale_max;     /* an isolated point would start as a floater */
-    float scale_log_min, scale_log_max; /* every log-scale is kept in here: far outside what a scene needs,
-                                           far inside what floats hold */
+    float scale_log_min, scale_log_limit; /* every log-scale is kept in here: far outside what a scene needs,
+                                             far inside what floats hold */
+    float *scale_log_max;                 /* [anchors.count]: and below this (train/widest.h) */
     trace_settings settings;
     sky_moments sky; /* of the background in `settings`, where it varies */
     size_t anchors_initial, points_used;

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* train/widest.c -- the distance from each anchor to the nearest training camera, as a bound of its scales. */
+#include "train/widest.h"
+
+#include <math.h>
+
+#include "base/memory.h"
+#include "bvh/points.h"
+
+/* Poses that are learned would bound the scales of a resumed run differently: those of the data set. */
+static void camera_centers(const trainer *t, float *center)
+{
+    for (size_t v = 0; v < t->train_count; v++) {
+        const size_t view = t->train_views[v];
+        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[view] : &t->scene.views[view].camera;
+        for (size_t k = 0; k < 3; k++)
+            center[3 * v + k] = (float)camera->center[k];
+    }
+}
+
+static gbt_status find_distances(const trainer *t, double *squared, gbt_error *err)
+{
+    float *center = mem_alloc(3 * t->train_count, sizeof *center, "cameras", err);
+    uint32_t *nearest = mem_alloc(t->anchors.count, sizeof *nearest, "cameras", err);
+    gbt_status status = center == NULL || nearest == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK) {
+        camera_centers(t, center);
+        status = points_find_nearest(center, t->train_count, t->anchors.position, t->anchors.count, nearest,
+                                     squared, err);
+    }
+    mem_free(nearest);
+    mem_free(center);
+    return status;
+}
+
+gbt_status widest_update(trainer *t, gbt_error *err)
+{
+    const size_t count = t->anchors.count;
+    float *log_max = mem_alloc(count, sizeof *log_max, "largest scales", err);
+    double *squared = mem_alloc(count, sizeof *squared, "cameras", err);
+    gbt_status status = log_max == NULL || squared == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    if (status == GBT_OK)
+        status = find_distances(t, squared, err);
+    if (status == GBT_OK) {
+        for (size_t i = 0; i < count; i++)
+            log_max[i] = fminf(t->scale_log_limit, (float)(log(t->rules.widest) + 0.5 * log(squared[i])));
+        mem_free(t->scale_log_max);
+        t->scale_log_max = log_max;
+        log_max = NULL;
+    }
+    mem_free(squared);
+    mem_free(log_max);
+    return status;
+}

@@ -346,6 +346,7 @@ static bool wants_views(const gbt_render_def *def)
 
 static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_error *err)
 {
+    GBT_TRY(video_check_name(out, err));
     GBT_TRY(def_check(def->cookie_, "gbt_render_def_default", err));
     GBT_TRY(choice_check("split", GBT_SPLIT_NAMES, (int)def->split, err));
     GBT_TRY(choice_check("format", GBT_PICTURE_FORMAT_NAMES, (int)def->format, err));

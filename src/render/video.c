@@ -9,6 +9,7 @@
 #include <spawn.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -41,18 +42,31 @@ struct video {
     unsigned char *row; /* one picture, [height][width][3] */
 };
 
+static bool ends_with(const char *path, const char *ending)
+{
+    const size_t length = strlen(path), end = strlen(ending);
+    return length > end && strcasecmp(path + length - end, ending) == 0;
+}
+
 static int kind_of(const char *path)
 {
-    const size_t length = strlen(path);
-    for (int i = 0; i < KINDS; i++) {
-        const size_t end = strlen(kinds[i].ending);
-        if (length > end && strcmp(path + length - end, kinds[i].ending) == 0)
-            return i;
-    }
-    return KINDS;
+    int i = 0;
+    while (i < KINDS && !ends_with(path, kinds[i].ending))
+        i++;
+    return i;
 }
 
 bool video_named(const char *path) { return kind_of(path) < KINDS; }
+
+gbt_status video_check_name(const char *path, gbt_error *err)
+{
+    static const char *const others[] = {".mov", ".m4v", ".mkv", ".avi", ".mpg", ".mpeg", ".wmv", ".ogv"};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++)
+        if (ends_with(path, others[i]))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)", path);
+    return GBT_OK;
+}
 
 enum { NOT_STARTED = 127 }; /* exit code of a process whose program could not be started (POSIX) */
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clones.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -114,10 +115,8 @@ FASTEST_CLONE static void keep_between(float *values, size_t rows, size_t width,
                                        const float *most)
 {
     for (size_t r = 0; r < rows; r++)
-        for (size_t i = r * width; i < (r + 1) * width; i++) { /* fminf() and fmaxf() would be calls */
-            const float below = values[i] < most[r] ? values[i] : most[r];
-            values[i] = below > least ? below : least;
-        }
+        for (size_t i = r * width; i < (r + 1) * width; i++)
+            values[i] = larger(smaller(values[i], most[r]), least);
 }
 
 /* Rows [begin, end), all of one age. */

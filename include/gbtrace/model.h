@@ -179,7 +179,7 @@ typedef struct gbt_gaussians_gradient {
  * directions of the spherical harmonics, or through the direction and distance that the networks are given.
  * Pixels' footprints move with the camera and are in these sums. It is the gradient of the picture between
  * cuts: where a response crosses alpha_min, or a ray its end, a picture jumps a little, and no gradient says
- * so.
+ * so. That a background which depends on direction (a learned sky) turns is left out of dL/domega.
  *
  * @param d_rgb       [in]  [height][width][3], finite
  * @param d_pose      [out] dL/d(v, omega); optional (NULL)

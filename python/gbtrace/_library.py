@@ -198,6 +198,8 @@ def address(array, name, shape, writable=False):
         raise ValueError(f"{name}: shape {array.shape} (wanted {tuple(shape)})")
     if not array.flags.c_contiguous:
         raise ValueError(f"{name}: not contiguous (wanted C order; numpy.ascontiguousarray() copies it)")
+    if not array.flags.aligned:
+        raise ValueError(f"{name}: not aligned (its .copy() is)")
     if writable and not array.flags.writeable:
         raise ValueError(f"{name}: read-only")
     return array.ctypes.data

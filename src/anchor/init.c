@@ -156,8 +156,8 @@ static gbt_status place(anchors *a, const float *center, size_t count, gbt_error
 }
 
 /* `wanted` of the points, each set of so many with equal chances, in their order. */
-static gbt_status choose_points(const float *position, size_t count, size_t wanted, float **out,
-                                gbt_error *err)
+static gbt_status choose_points(const float *position, size_t count, size_t wanted, uint64_t seed,
+                                float **out, gbt_error *err)
 {
     GBT_TRY(cloud_check("random anchors", position, NULL, count, err));
     *out = mem_alloc(wanted, 3 * sizeof **out, "anchors", err);
@@ -165,7 +165,7 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
         return GBT_ERR_NO_MEMORY;
     size_t chosen = 0;
     for (size_t i = 0; i < count && chosen < wanted; i++)
-        if ((double)rng_uniform(0, 0, i) * (double)(count - i) < (double)(wanted - chosen))
+        if ((double)rng_uniform(seed, 0, i) * (double)(count - i) < (double)(wanted - chosen))
             memcpy(*out + 3 * chosen++, position + 3 * i, 3 * sizeof **out);
     return GBT_OK;
 }
@@ -197,7 +197,7 @@ static gbt_status find_centers(const float *position, const float *color, size_t
     GBT_TRY(count_wanted(position, color, count, def, &wanted, err));
     if (def->kind == GBT_INIT_RANDOM) {
         *center_count = wanted;
-        return choose_points(position, count, wanted, centers, err);
+        return choose_points(position, count, wanted, def->seed, centers, err);
     }
     adaptive_def adaptive = adaptive_def_default();
     adaptive.voxel_size = def->balls.voxel_size;

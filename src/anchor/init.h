@@ -15,6 +15,7 @@ typedef struct anchor_init_def {
     gbt_init_kind kind;    /* default GBT_INIT_GB */
     gbt_scale_prior scale; /* default GBT_SCALE_PRIOR_GB, for GBT_INIT_GB alone: the others always use
                                 GBT_SCALE_PRIOR_NN */
+    uint64_t seed;         /* of GBT_INIT_RANDOM. Default 0 */
     double fraction;  /* anchors per point of GBT_INIT_ADAPTIVE and _RANDOM, [0, 1], at least one; 0: half
                          as many as GBT_INIT_GB makes. Default 0 */
     balls_def balls;  /* voxel_size must be set; also the voxel edge of GBT_INIT_VOXEL */

@@ -296,7 +296,7 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     const frame_drawing drawing = f->draw;
     f->draw.renderer = GBT_RENDERER_TRACE;
     for (size_t i = 0; i < camera_count && status == GBT_OK; i++) {
-        status = add_view(&b, f, d, &cameras[i], settings, err);
+        status = add_view(&b, f, d, &cameras[i], &settings[i], err);
         log_count("bake", i + 1, camera_count, (double)NAN);
     }
     f->draw = drawing;

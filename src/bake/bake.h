@@ -30,6 +30,7 @@ typedef struct bake_result {
  *
  * @param f       [in,out] any frame; its drawing is kept, but for the renderer: weights are traced
  * @param cameras [in] those of the training photos
+ * @param settings [in] [camera_count]: how each is drawn
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, no Gaussian is seen), GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Memory: 1.5 kB per neural Gaussian. Cost: a forward
  * and an adjoint pass of a quarter of the pixels per camera.

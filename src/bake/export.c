@@ -24,7 +24,7 @@
 
 enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
 
-static const double near_loss_db = 1; /* from here on a warning */
+static const double near_loss_db = 0.5; /* from here on a warning */
 
 gbt_export_def gbt_export_def_default(void)
 {
@@ -56,6 +56,7 @@ typedef struct exporting {
     size_t unseen, thinned;
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
     size_t view_count, *views; /* that are compared */
+    size_t photo_count;        /* of these, with photos that say something */
     bool held_out;
     frame frame, bake;    /* of what a file gives back, and of what was written */
     const char *folder;   /* the output that is a result folder, or NULL */
@@ -88,15 +89,20 @@ static gbt_status choose_views(exporting *e, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status training_cameras(const loaded_run *r, gbt_camera **out, size_t *count, gbt_error *err)
+/* Cameras of the training photos, and how each is drawn. Both are to be freed, also after a failure. */
+static gbt_status training_cameras(const loaded_run *r, gbt_camera **cameras, trace_settings **settings,
+                                   size_t *count, gbt_error *err)
 {
     *count = 0;
-    *out = mem_alloc(r->scene.view_count + 1, sizeof **out, "cameras", err);
-    if (*out == NULL)
+    *cameras = mem_alloc(r->scene.view_count + 1, sizeof **cameras, "cameras", err);
+    *settings = mem_alloc(r->scene.view_count + 1, sizeof **settings, "cameras", err);
+    if (*cameras == NULL || *settings == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < r->scene.view_count; i++)
-        if (!r->scene.views[i].is_test)
-            (*out)[(*count)++] = photos_camera(&r->photos, i, 0);
+        if (!r->scene.views[i].is_test) {
+            (*cameras)[*count] = photos_camera(&r->photos, i, 0);
+            (*settings)[(*count)++] = loaded_run_settings(r, i);
+        }
     return GBT_OK;
 }
 
@@ -128,17 +134,19 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
 static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt_error *err)
 {
     loaded_run *r = &e->run;
-    gbt_camera *cameras = NULL;
+    gbt_camera *cameras;
+    trace_settings *settings;
     size_t count;
-    GBT_TRY(training_cameras(r, &cameras, &count, err));
+    gbt_status status = training_cameras(r, &cameras, &settings, &count, err);
     bake_def bake = bake_def_default();
     bake.sh_degree = sh_degree;
     if (e->def->gaussians > 0)
         bake.count_max = (size_t)e->def->gaussians - (e->backdrop ? BACKDROP_COUNT : 0);
     bake_result result = {0};
     double clock = clock_wall();
-    gbt_status status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count,
-                                   &r->settings, &bake, &result, err);
+    if (status == GBT_OK)
+        status = bake_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, settings, &bake,
+                            &result, err);
     *out = result.cloud;
     e->unseen = result.unseen;
     e->thinned = result.thinned;
@@ -147,13 +155,14 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     refine_def refine = refine_def_default();
     refine.steps = e->def->refine_steps;
     if (status == GBT_OK)
-        status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, &r->settings,
+        status = refine_cloud(&r->frame, &r->model.anchors, &r->model.decoder, cameras, count, settings,
                               &refine, out, err);
     e->refine_seconds = clock_wall() - clock;
     if (status == GBT_OK && e->backdrop)
         status = backdrop_add(out, cameras, count, r->model.background, &r->model.sky, err);
     out->antialiased = r->frame.draw.footprint > 0;
     out->near = r->settings.t_near;
+    mem_free(settings);
     mem_free(cameras);
     return status;
 }
@@ -178,7 +187,10 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
     const trace_settings viewer = viewer_at(e, index, e->run.settings.t_near);
     image_quantize(photo);
     image_quantize(neural);
-    e->model_to_photo += share * metric_psnr_valid(neural, photo, valid);
+    const double of_model = metric_psnr_valid(neural, photo, valid);
+    const bool scored = !isnan(of_model); /* not where a mask covers the whole photo */
+    e->photo_count += scored;
+    e->model_to_photo += scored ? of_model : 0;
     for (size_t i = 0; i < e->file_count; i++) {
         exported *f = &e->files[i];
         GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &viewer, false, err));
@@ -196,7 +208,7 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
             image_quantize(shown);
         }
         f->to_model += share * metric_psnr(shown, neural);
-        f->to_photo += share * metric_psnr_valid(shown, photo, valid);
+        f->to_photo += scored ? metric_psnr_valid(shown, photo, valid) : 0;
         if (f->path != e->folder || !e->held_out)
             continue;
         GBT_TRY(image_score(shown, photo, valid, NULL, &e->scores[index], err));
@@ -226,15 +238,20 @@ static gbt_status compare(exporting *e, gbt_error *err)
         mem_free(marks);
         GBT_TRY(status);
     }
+    e->model_to_photo /= (double)e->photo_count;
+    for (size_t i = 0; i < e->file_count; i++)
+        e->files[i].to_photo /= (double)e->photo_count;
     return GBT_OK;
 }
 
 /* ---- entry ---- */
 
-/* A file can be written where it goes; one inside the result folder where that can. */
+/* A file can be written where it goes; one in the result folder, which is made first, where that can. */
 static gbt_status check_place(const char *path, const char *folder, gbt_error *err)
 {
-    if (path == NULL || (folder != NULL && strncmp(path, folder, strlen(folder)) == 0))
+    const size_t length = folder != NULL ? strlen(folder) : 0;
+    if (path == NULL ||
+        (length > 0 && strncmp(path, folder, length) == 0 && strchr(path + length, '/') == NULL))
         return GBT_OK;
     return file_check_creatable(path, err);
 }
@@ -338,14 +355,14 @@ static gbt_status write_file(exporting *e, const char *path, const gaussian_clou
 
 static json_t *file_to_json(const exporting *e, const exported *f)
 {
-    json_t *row = json_pack("{s:s,s:I,s:i}", "file", f->path, "bytes", (json_int_t)f->bytes, "sh_degree",
-                            f->shown->sh_degree);
+    json_t *row = json_pack("{s:o,s:I,s:i}", "file", json_text(f->path), "bytes", (json_int_t)f->bytes,
+                            "sh_degree", f->shown->sh_degree);
     if (e->baked && e->view_count > 0) {
         if (f->shown != f->baked)
             json_object_set_new(row, "psnr_to_bake", json_number(f->to_bake));
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
-        json_object_set_new(row, "psnr_to_photos", json_real(f->to_photo));
-        json_object_set_new(row, "model_psnr_to_photos", json_real(e->model_to_photo));
+        json_object_set_new(row, "psnr_to_photos", json_number(f->to_photo));
+        json_object_set_new(row, "model_psnr_to_photos", json_number(e->model_to_photo));
     }
     return row;
 }
@@ -356,7 +373,7 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     if (e->baked && e->view_count > 0) {
         fprintf(report, "; %zu %s views: %.2f dB to the model", e->view_count,
                 e->held_out ? "held-out" : "training", f->to_model);
-        if (!e->run.def.exposure)
+        if (!e->run.def.exposure && e->photo_count > 0)
             fprintf(report, ", %.2f dB to the photos (the model: %.2f)", f->to_photo, e->model_to_photo);
         fprintf(report, ", drawn on %s", e->viewer.background[0] > 0 ? "white" : "black");
     }
@@ -402,8 +419,8 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {
         const size_t count = e->file_count > 0 ? e->files[e->file_count - 1].shown->count : 0;
-        json_t *root = json_pack("{s:i,s:s,s:I,s:I,s:I,s:O}", "schema", 1, "input", input, "gaussians",
-                                 (json_int_t)count, "unseen", (json_int_t)e->unseen, "thinned",
+        json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:I,s:O}", "schema", 1, "input", json_text(input),
+                                 "gaussians", (json_int_t)count, "unseen", (json_int_t)e->unseen, "thinned",
                                  (json_int_t)e->thinned, "files", files);
         status = json_save(root, e->def->json, err);
         json_decref(root);
@@ -448,6 +465,8 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
                      : base_fail(err, GBT_ERR_ARGUMENT, "lpips: is for result folders alone (wanted OUT/)");
     if (status == GBT_OK && e->baked)
         status = open_run(e, input, err);
+    if (status == GBT_OK && e->folder != NULL)
+        status = file_make_folder(e->folder, err);
     for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
         status = write_kind(e, input, flat, outputs, output_count, report, err);
     if (status == GBT_OK && e->baked)

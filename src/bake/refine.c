@@ -135,7 +135,8 @@ gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, cons
         uint32_t words[4];
         rng_philox(def->seed, STREAM, (uint64_t)i, words);
         set_rates(&r, i, def->steps);
-        status = refine_step(&r, teacher, a, d, &cameras[words[0] % camera_count], settings, words, err);
+        const size_t at = words[0] % camera_count;
+        status = refine_step(&r, teacher, a, d, &cameras[at], &settings[at], words, err);
         log_count("refine", (uint64_t)i + 1, (uint64_t)def->steps, (double)NAN);
     }
     teacher->draw.pixel_step = pixel_step;

@@ -18,6 +18,7 @@ refine_def refine_def_default(void);
  * the two pictures.
  *
  * @param teacher  [in,out] a frame with the model's own drawing
+ * @param settings [in]     [camera_count]: how each is drawn
  * @param cloud    [in,out] sh_degree stays; unit quaternions and opacities in (0, 1) come out
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Cost: some 30 ms of two cores a step at 480 x 359 and

@@ -19,13 +19,17 @@ json_t *json_text(const char *text)
     if (value != NULL)
         return value;
     const size_t length = strlen(text);
-    char *plain = mem_alloc(length + 1, 1, "JSON text", NULL);
-    if (plain == NULL)
+    char *letters = mem_alloc(2 * length + 1, 1, "JSON text", NULL), *end = letters;
+    if (letters == NULL)
         return NULL;
-    for (size_t i = 0; i <= length; i++)
-        plain[i] = (unsigned char)text[i] < 0x80 ? text[i] : '?';
-    value = json_string(plain);
-    mem_free(plain);
+    for (size_t i = 0; i < length; i++) {
+        const unsigned char byte = (unsigned char)text[i];
+        if (byte >= 0x80)
+            *end++ = (char)(0xc0 | byte >> 6);
+        *end++ = (char)(byte < 0x80 ? byte : 0x80 | (byte & 0x3f));
+    }
+    value = json_stringn(letters, (size_t)(end - letters));
+    mem_free(letters);
     return value;
 }
 

@@ -8,7 +8,8 @@
 
 #include "gbtrace/status.h"
 
-/** A JSON string of any bytes: what is not UTF-8 becomes ?. NULL without memory. */
+/** A JSON string of any bytes: those that are not UTF-8 are taken for Latin-1, so that different texts stay
+    different. NULL without memory. */
 json_t *json_text(const char *text);
 
 /** A JSON number; null for what JSON has no number for: NaN, infinities. */

@@ -226,6 +226,13 @@ gbt_status ply_read_rows(const source_file *file, const ply_header *header, int 
                          size_t column_count, ply_row *row, void *context, gbt_error *err)
 {
     column_rows rows = {columns, column_count, row, context};
+    for (size_t j = 0; j < column_count; j++) {
+        const ply_property *p =
+            &header->properties[header->elements[element].first_property + (size_t)columns[j]];
+        if (p->is_list)
+            return base_fail(err, GBT_ERR_FORMAT, "%s: property %.*s is a list (wanted a number)", file->name,
+                             p->name_length < 60 ? (int)p->name_length : 60, p->name);
+    }
     return read_rows(file, header, element, &(kept_list){.property = -1}, use_columns, &rows, err);
 }
 

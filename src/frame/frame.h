@@ -134,7 +134,7 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
 /**
  * Gradient by the six numbers of a motion of the camera (trace/pose_gradient.h), after
  * frame_backward_gaussians() and before anything else is added to f->d_gaussians. Exact for rays, and for
- * splats up to where their projection is cut at the border of the picture.
+ * splats up to where their projection is cut at the border of the picture; but that a sky turns is left out.
  */
 gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err);
 

@@ -2,6 +2,7 @@
 /* library/open.c -- models from files and arrays, and what can be asked of them. */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -29,6 +30,7 @@ gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err)
     gbt_model *m;
     *out = NULL;
     GBT_TRY(make(&m, err));
+    snprintf(m->path, sizeof m->path, "%s", path); /* a longer one cannot be opened */
     return opened(m, loaded_run_open_model(path, &m->run, err), out);
 }
 
@@ -38,6 +40,7 @@ void gbt_model_close(gbt_model *m)
         return;
     loaded_run_close(&m->run);
     mem_free(m->quat_length);
+    mem_free(m->raised);
     gaussian_cloud_free(&m->gradient);
     mem_free(m->d_mean);
     mem_free(m);
@@ -80,8 +83,9 @@ static gbt_status check(const gbt_gaussians *g, gbt_error *err)
     return GBT_OK;
 }
 
-/* Copies, in the form that files are read into; and the lengths of the quaternions. */
-static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *quat_length, gbt_error *err)
+/* Copies, in the form that files are read into; and what that changed. */
+static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *quat_length,
+                       unsigned char *raised, gbt_error *err)
 {
     const size_t width = 3 * (size_t)((g->sh_degree + 1) * (g->sh_degree + 1));
     cloud->sh_degree = g->sh_degree;
@@ -103,6 +107,9 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
             cloud->quat[4 * i + k] = (float)((double)q[k] / length);
         memcpy(cloud->sh + i * GAUSSIAN_SH_COUNT * 3, g->sh + i * width, width * sizeof *g->sh);
         gaussian_limit_scales(cloud->scale_log + 3 * i);
+        raised[i] = 0;
+        for (size_t k = 0; k < 3; k++)
+            raised[i] |= (unsigned char)((cloud->scale_log[3 * i + k] > g->scale_log[3 * i + k]) << k);
     }
     return GBT_OK;
 }
@@ -116,15 +123,20 @@ gbt_status gbt_model_set_gaussians(gbt_model *m, const gbt_gaussians *g, gbt_err
     gaussian_cloud cloud = {0};
     GBT_TRY(gaussian_cloud_alloc(&cloud, g->count, err));
     float *quat_length = mem_alloc(g->count, sizeof *quat_length, "quaternions", err);
-    const gbt_status status = quat_length == NULL ? GBT_ERR_NO_MEMORY : copy(g, &cloud, quat_length, err);
+    unsigned char *raised = mem_alloc(g->count, sizeof *raised, "scales", err);
+    const gbt_status status =
+        quat_length == NULL || raised == NULL ? GBT_ERR_NO_MEMORY : copy(g, &cloud, quat_length, raised, err);
     if (status != GBT_OK) {
         gaussian_cloud_free(&cloud);
         mem_free(quat_length);
+        mem_free(raised);
         return status;
     }
     loaded_run_take_cloud(&m->run, &cloud);
     mem_free(m->quat_length);
     m->quat_length = quat_length;
+    mem_free(m->raised);
+    m->raised = raised;
     m->kept = false;
     return GBT_OK;
 }
@@ -207,7 +219,9 @@ gbt_status gbt_model_open_views(gbt_model *m, const char *data, size_t *count, g
 {
     *count = 0;
     loaded_run_close_views(&m->run);
-    GBT_TRY(loaded_run_open_views("model", data, 0, &m->run, err));
+    if (data == NULL && m->path[0] == '\0')
+        return base_fail(err, GBT_ERR_ARGUMENT, "model: Gaussians of arrays know no cameras (wanted `data`)");
+    GBT_TRY(loaded_run_open_views(m->path, data, 0, &m->run, err));
     *count = m->run.scene.view_count;
     return GBT_OK;
 }

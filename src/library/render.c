@@ -47,6 +47,19 @@ static void hand_out(const float *from, size_t count, float *to)
         memcpy(to, from, count * sizeof *to);
 }
 
+/* A scale that was raised (gaussian_limit_scales()) is a part of the largest one. */
+static void give_to_largest(const float scale_log[3], unsigned raised, float gradient[3])
+{
+    const int largest = scale_log[0] >= scale_log[1] && scale_log[0] >= scale_log[2] ? 0
+                        : scale_log[1] >= scale_log[2]                               ? 1
+                                                                                     : 2;
+    for (int k = 0; k < 3; k++)
+        if (raised >> k & 1) {
+            gradient[largest] += gradient[k];
+            gradient[k] = 0;
+        }
+}
+
 /* f->d_gaussians to the arrays of the caller. */
 static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out, gbt_error *err)
 {
@@ -62,6 +75,8 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
     for (size_t i = 0; i < n && m->quat_length != NULL; i++)
         for (size_t k = 0; k < 4; k++)
             g->quat[4 * i + k] /= m->quat_length[i];
+    for (size_t i = 0; i < n && m->raised != NULL; i++)
+        give_to_largest(cloud->scale_log + 3 * i, m->raised[i], g->scale_log + 3 * i);
     hand_out(m->d_mean, 3 * n, out->mean);
     hand_out(g->scale_log, 3 * n, out->scale_log);
     hand_out(g->quat, 4 * n, out->quat);

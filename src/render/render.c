@@ -9,6 +9,7 @@
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/image_header.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "cluster/cluster.h"
@@ -111,6 +112,11 @@ static gbt_status write_one(studio *st, const ray_shot *shot, const char *out, c
 static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,
                              const gbt_render_def *def, gbt_error *err)
 {
+    const gbt_camera *c = &shot->camera;
+    if ((int64_t)c->width * c->height * 3 > IMAGE_SAMPLES_MAX)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: a picture of %d x %d pixels (wanted at most %lld pixels)", name, c->width,
+                         c->height, (long long)(IMAGE_SAMPLES_MAX / 3));
     GBT_TRY(draw(st, shot, def, err));
     if (!st->together)
         return write_one(st, shot, out, name, def, err);
@@ -135,7 +141,11 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
         loaded_run_view_name(view, name, sizeof name);
         const gbt_camera camera = photos_camera(&r->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
-        GBT_TRY(render_one(st, &shot, out, name, def, err));
+        const trace_settings of_run = r->settings;
+        r->settings = loaded_run_settings(r, i);
+        const gbt_status status = render_one(st, &shot, out, name, def, err);
+        r->settings = of_run;
+        GBT_TRY(status);
         log_count("render", index, wanted, (double)NAN);
     }
     return GBT_OK;

@@ -64,7 +64,8 @@ gbt_status video_check_name(const char *path, gbt_error *err)
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         if (ends_with(path, others[i]))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)", path);
+                             "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)",
+                             path);
     return GBT_OK;
 }
 
@@ -115,9 +116,9 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)",
                          path, width, height);
-    /* ./: a name that begins with a dash is no option. */
+    /* ./: a name that begins with a dash is no option, and what stands before a colon no protocol. */
     if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
-        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", folder == 0 ? "./" : "", folder, path,
+        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", path[0] == '/' ? "" : "./", folder, path,
                  path + folder) >= (int)sizeof v->part)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
     v->width = width;

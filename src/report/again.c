@@ -63,7 +63,7 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
             return base_fail(err, GBT_ERR_IO, "%s: no such file or folder (wanted what gbtrace study wrote)",
                              studies[i]);
     GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
-    if (!file_exists(path))
+    if (file_is_folder(run) && !file_exists(path))
         return base_fail(err, GBT_ERR_IO,
                          "%s: not there: the run has no scores yet (gbtrace eval makes them)", path);
     GBT_TRY(json_read(path, &metrics, err));

@@ -253,11 +253,17 @@ frame_subject loaded_run_subject(const loaded_run *r)
     return r->cloud.count > 0 ? frame_plain(&r->cloud) : frame_neural(&r->model.anchors, &r->model.decoder);
 }
 
+trace_settings loaded_run_settings(const loaded_run *r, size_t view)
+{
+    trace_settings settings = r->settings;
+    settings.t_near = view_near(settings.t_near, &r->def, &r->scene.views[view]);
+    return settings;
+}
+
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&r->photos, view, 0);
-    trace_settings settings = r->settings;
-    settings.t_near = view_near(settings.t_near, &r->def, &r->scene.views[view]);
+    const trace_settings settings = loaded_run_settings(r, view);
     return frame_render(&r->frame, loaded_run_subject(r), &camera, &settings, false, err);
 }
 

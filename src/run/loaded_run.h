@@ -75,6 +75,9 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud);
 
 void loaded_run_close(loaded_run *r);
 
+/** The run's settings, with the near distance of this photo. */
+trace_settings loaded_run_settings(const loaded_run *r, size_t view);
+
 /** Render a view into r->frame.rgb, at the run's resolution. */
 gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
 

@@ -28,7 +28,8 @@ static gbt_status add_view(loaded_run *r, size_t view, probe *p, model_sensitivi
 {
     const anchors *a = &r->model.anchors;
     const gbt_camera camera = probe_camera(r, view);
-    GBT_TRY(frame_render(&r->frame, frame_neural(a, &r->model.decoder), &camera, &r->settings, true, err));
+    const trace_settings settings = loaded_run_settings(r, view);
+    GBT_TRY(frame_render(&r->frame, frame_neural(a, &r->model.decoder), &camera, &settings, true, err));
     GBT_TRY(image_fit(&p->signs, camera.width, camera.height, 3, err));
     const size_t values = (size_t)camera.width * (size_t)camera.height * 3;
     for (size_t i = 0; i < values; i++)

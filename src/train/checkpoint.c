@@ -55,52 +55,67 @@ static gbt_status read_anchors(const container *c, const char *prefix, size_t ro
                             err);
 }
 
-/* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
+#define HASH_START 0xcbf29ce484222325u
+
+/* FNV-1a, goes on from `hash`. */
+static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
+{
+    const unsigned char *at = bytes;
+    for (size_t i = 0; i < count; i++)
+        hash = (hash ^ at[i]) * 0x100000001b3u;
+    return hash;
+}
+
+/* Of what tells one data set from another: the names, sizes and centres of its views. */
 static uint64_t hash_of_views(const trainer *t)
 {
-    uint64_t hash = 0xcbf29ce484222325u;
+    uint64_t hash = HASH_START;
     for (size_t i = 0; i < t->scene.view_count; i++) {
         const scene_view *v = &t->scene.views[i];
         const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[i] : &v->camera;
         char text[512];
         const int length = snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, camera->width,
                                     camera->height, camera->center[0], camera->center[1], camera->center[2]);
-        for (int k = 0; k <= length; k++)
-            hash = (hash ^ (unsigned char)text[k]) * 0x100000001b3u;
+        hash = hash_bytes(hash, text, (size_t)length + 1);
     }
     return hash;
 }
 
-/* And of their lenses and directions. */
-static uint64_t hash_of_lenses(const trainer *t)
+/* And of their lenses, directions and motions, and of the sparse points. */
+static uint64_t hash_of_geometry(const trainer *t)
 {
-    uint64_t hash = 0xcbf29ce484222325u;
+    const scene_points *points = &t->scene.points;
+    uint64_t hash = hash_bytes(HASH_START, points->position, points->count * 3 * sizeof *points->position);
     for (size_t i = 0; i < t->scene.view_count; i++) {
-        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[i] : &t->scene.views[i].camera;
-        const int params = gbt_camera_param_count(camera->model);
-        for (int k = -1; k < params + 9; k++) {
+        const gbt_camera *c = t->poses.count > 0 ? &t->poses.given[i] : &t->scene.views[i].camera;
+        double values[2 + GBT_CAMERA_MAX_PARAMS + 9 + 6] = {(double)c->model, (double)c->shutter};
+        memcpy(values + 2, c->params, (size_t)gbt_camera_param_count(c->model) * sizeof *values);
+        memcpy(values + 2 + GBT_CAMERA_MAX_PARAMS, c->rotation, sizeof c->rotation);
+        memcpy(values + 2 + GBT_CAMERA_MAX_PARAMS + 9, c->motion, sizeof c->motion);
+        for (size_t k = 0; k < sizeof values / sizeof *values; k++) {
             char text[32];
-            const double value = k < 0        ? (double)camera->model
-                                 : k < params ? camera->params[k]
-                                              : camera->rotation[k - params];
-            snprintf(text, sizeof text, "%.6f ", value);
-            for (int j = 0; text[j] != '\0'; j++)
-                hash = (hash ^ (unsigned char)text[j]) * 0x100000001b3u;
+            hash = hash_bytes(hash, text, (size_t)snprintf(text, sizeof text, "%.6g ", values[k]));
         }
     }
     return hash;
 }
 
-gbt_status checkpoint_hash_photos(const scene *s, uint64_t *out, gbt_error *err)
+static gbt_status hash_ends(const char *path, uint64_t *hash, gbt_error *err)
 {
-    *out = 0xcbf29ce484222325u;
+    unsigned char ends[2 * PHOTO_END_BYTES + sizeof(uint64_t)];
+    size_t count = 0;
+    if (path != NULL)
+        GBT_TRY(file_read_ends(path, PHOTO_END_BYTES, ends, &count, err));
+    *hash = hash_bytes(*hash, ends, count);
+    return GBT_OK;
+}
+
+gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t *of_masks, gbt_error *err)
+{
+    *of_photos = *of_masks = HASH_START;
     for (size_t i = 0; i < s->view_count; i++) {
-        unsigned char ends[2 * PHOTO_END_BYTES + sizeof(uint64_t)];
-        size_t count = 0;
-        if (s->views[i].path != NULL)
-            GBT_TRY(file_read_ends(s->views[i].path, PHOTO_END_BYTES, ends, &count, err));
-        for (size_t k = 0; k < count; k++)
-            *out = (*out ^ ends[k]) * 0x100000001b3u;
+        GBT_TRY(hash_ends(s->views[i].path, of_photos, err));
+        GBT_TRY(hash_ends(s->views[i].mask_path, of_masks, err));
     }
     return GBT_OK;
 }
@@ -139,8 +154,9 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
     container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(t)});
-    container_add_small(&w, "lenses", CONTAINER_U64, 1, (const uint64_t[]){hash_of_lenses(t)});
+    container_add_small(&w, "geometry", CONTAINER_U64, 1, (const uint64_t[]){hash_of_geometry(t)});
     container_add_small(&w, "photos", CONTAINER_U64, 1, &t->photos_hash);
+    container_add_small(&w, "masks", CONTAINER_U64, 1, &t->masks_hash);
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
     if (e->count > 0) {
@@ -253,6 +269,19 @@ static gbt_status read_creation(trainer *t, const container *c, const char *path
     return GBT_OK;
 }
 
+/* Older checkpoints do not have each section. */
+static gbt_status check_hash(const trainer *t, const container *c, const char *path, const char *section,
+                             uint64_t own, const char *other, gbt_error *err)
+{
+    uint64_t saved = own;
+    if (container_section_named(c, section) != NULL)
+        GBT_TRY(container_get(c, section, CONTAINER_U64, 1, &saved, err));
+    if (saved != own)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (%.1000s has %s)", path,
+                         t->scene.folder, other);
+    return GBT_OK;
+}
+
 static gbt_status read_state(trainer *t, const container *c, const char *path, gbt_error *err)
 {
     uint64_t counters[8];
@@ -264,29 +293,13 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
                          (unsigned long long)counters[6],
                          t->scene.photos_missing > 0 ? "; photos that are missing: " : "",
                          t->scene.missing_names);
-    uint64_t views = hash_of_views(t);
-    if (container_section_named(c, "views") != NULL) /* older checkpoints have none */
-        GBT_TRY(container_get(c, "views", CONTAINER_U64, 1, &views, err));
-    if (views != hash_of_views(t))
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: made from other data (%.1000s has photos of other names, sizes or cameras)",
-                         path, t->scene.folder);
-    uint64_t lenses = hash_of_lenses(t);
-    if (container_section_named(c, "lenses") != NULL) /* older checkpoints have none */
-        GBT_TRY(container_get(c, "lenses", CONTAINER_U64, 1, &lenses, err));
-    if (lenses != hash_of_lenses(t))
-        return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: made from other data (%.1000s has photos with other lenses or directions)",
-                         path, t->scene.folder);
-    uint64_t saved;
-    if (container_section_named(c, "photos") != NULL) { /* older checkpoints have none */
-        GBT_TRY(container_get(c, "photos", CONTAINER_U64, 1, &saved, err));
-        if (saved != t->photos_hash)
-            return base_fail(
-                err, GBT_ERR_FORMAT,
-                "%s: made from other data (%.1000s has photos of the same names, but other pictures)", path,
-                t->scene.folder);
-    }
+    GBT_TRY(
+        check_hash(t, c, path, "views", hash_of_views(t), "photos of other names, sizes or cameras", err));
+    GBT_TRY(check_hash(t, c, path, "geometry", hash_of_geometry(t),
+                       "photos with other lenses or directions, or other sparse points", err));
+    GBT_TRY(check_hash(t, c, path, "photos", t->photos_hash, "photos of the same names, but other pictures",
+                       err));
+    GBT_TRY(check_hash(t, c, path, "masks", t->masks_hash, "other masks", err));
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path,
                          (unsigned long long)counters[4], PACE_SEGMENTS);

@@ -6,8 +6,8 @@
 #include "train/trainer.h"
 
 /** FNV-1a of the sizes of all photos, and of the bytes at both ends of each: another photo under the same
-   name has another one. GBT_ERR_IO: one cannot be read. */
-gbt_status checkpoint_hash_photos(const scene *s, uint64_t *out, gbt_error *err);
+   name has another one. Likewise of all masks. GBT_ERR_IO: one cannot be read. */
+gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t *of_masks, gbt_error *err);
 
 /** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev. */
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err);

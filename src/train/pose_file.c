@@ -31,9 +31,9 @@ gbt_status pose_file_write(const scene *s, const char *path, gbt_error *err)
         double center[3];
         for (int k = 0; k < 3; k++)
             center[k] = camera->center[k] + s->origin[k];
-        json_array_append_new(photos, json_pack("{s:s,s:b,s:o,s:o}", "name", s->views[i].name, "held_out",
-                                                s->views[i].is_test, "rotation", numbers(camera->rotation, 9),
-                                                "center", numbers(center, 3)));
+        json_array_append_new(photos, json_pack("{s:o,s:b,s:o,s:o}", "name", json_text(s->views[i].name),
+                                                "held_out", s->views[i].is_test, "rotation",
+                                                numbers(camera->rotation, 9), "center", numbers(center, 3)));
     }
     json_object_set_new(root, "photos", photos);
     const gbt_status status = json_save_styled(root, JSON_INDENT(1) | JSON_REAL_PRECISION(17), path, err);
@@ -52,12 +52,16 @@ static bool get_numbers(const json_t *array, size_t count, double *out)
     return fine;
 }
 
-static scene_view *find_view(const scene *s, const char *name)
+/* By the name that pose_file_write() gave it. */
+static scene_view *find_view(const scene *s, const json_t *name)
 {
-    for (size_t i = 0; name != NULL && i < s->view_count; i++)
-        if (strcmp(s->views[i].name, name) == 0)
-            return &s->views[i];
-    return NULL;
+    scene_view *found = NULL;
+    for (size_t i = 0; found == NULL && i < s->view_count; i++) {
+        json_t *own = json_text(s->views[i].name);
+        found = json_equal(own, name) ? &s->views[i] : NULL;
+        json_decref(own);
+    }
+    return found;
 }
 
 static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt_error *err)
@@ -74,7 +78,7 @@ static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt
             return base_fail(err, GBT_ERR_FORMAT,
                              "%s: photo %zu: no pose (wanted a rotation of 9 numbers and a center of 3)",
                              path, i);
-        scene_view *view = find_view(s, json_string_value(json_object_get(photo, "name")));
+        scene_view *view = find_view(s, json_object_get(photo, "name"));
         if (view == NULL)
             continue;
         memcpy(view->camera.rotation, rotation, sizeof rotation);

@@ -9,6 +9,7 @@
 #include "base/compare.h"
 #include "base/vec.h"
 #include "train/adam.h"
+#include "train/gradient_check.h"
 #include "train/schedule.h"
 
 gbt_status poses_make(poses *p, const scene *s, size_t count, double unit, gbt_error *err)
@@ -54,7 +55,7 @@ bool pose_is_finite(const double gradient[POSE_NUMBERS])
     double sum = 0;
     for (int k = 0; k < POSE_NUMBERS; k++)
         sum += fabs(gradient[k]);
-    return isfinite(sum);
+    return sum <= (double)GRADIENT_LIMIT;
 }
 
 /* The same motion, of the world's axes, for another camera. */

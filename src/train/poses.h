@@ -41,6 +41,7 @@ void poses_free(poses *p);
 void pose_learn(float *moment1, float *moment2, const double gradient[POSE_NUMBERS], double unit,
                 uint64_t age, double rate, double motion[POSE_NUMBERS]);
 
+/** Finite, and below GRADIENT_LIMIT. */
 bool pose_is_finite(const double gradient[POSE_NUMBERS]);
 
 /** One step of photo `index` of `train_views`, and the mean back to where it was. `gradient` is finite. */

@@ -2,6 +2,7 @@
 /* train/resume.c -- go on with a run. */
 #include "train/resume.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,23 +15,17 @@
 #include "train/run_data.h"
 #include "train/run_split.h"
 
-/* The checkpoint to go on from, and the settings in it. */
-static gbt_status find_checkpoint(const char *latest, const char *previous, const char **path,
-                                  char config[CONFIG_TEXT_SIZE], gbt_error *err)
+gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err)
 {
-    *path = !file_exists(latest) && file_exists(previous) ? previous : latest;
-    gbt_error first = {0};
-    const gbt_status status = checkpoint_config(*path, config, CONFIG_TEXT_SIZE, &first);
-    if (status == GBT_OK)
-        return GBT_OK;
-    if (*path == previous || !file_exists(previous))
-        return base_fail(err, status, "%s", first.text);
-    log_warn("%s; going on from %s", first.text, previous);
-    *path = previous;
-    GBT_TRY(checkpoint_config(previous, config, CONFIG_TEXT_SIZE, err));
-    /* Or the next save would put the damaged one in the place of the only whole one. */
-    if (status == GBT_ERR_FORMAT && rename(previous, latest) == 0)
-        *path = latest;
+    char config[CONFIG_TEXT_SIZE];
+    gbt_error why = {0};
+    if (!file_exists(latest) || !file_exists(previous) ||
+        checkpoint_config(latest, config, sizeof config, &why) != GBT_ERR_FORMAT ||
+        checkpoint_config(previous, config, sizeof config, NULL) != GBT_OK)
+        return GBT_OK; /* resume_open() says what is wrong, if anything is */
+    log_warn("%s; going on from %s", why.text, previous);
+    if (rename(previous, latest) != 0)
+        return base_fail(err, GBT_ERR_IO, "%s: cannot be named %s: %s", previous, latest, strerror(errno));
     return GBT_OK;
 }
 
@@ -126,9 +121,9 @@ gbt_status resume_open(trainer *t, const char *data, const char *run, const char
                        gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
-    const char *path;
+    const char *path = !file_exists(latest) && file_exists(previous) ? previous : latest;
     GBT_TRY(train_def_check(def, err));
-    GBT_TRY(find_checkpoint(latest, previous, &path, config, err));
+    GBT_TRY(checkpoint_config(path, config, sizeof config, err));
     gbt_train_def saved = *def;
     for (size_t i = 0; i < gbt_train_setting_count(); i++) /* it says nothing of some that it left alone */
         if (gbt_train_setting_at(i)->saved)

@@ -6,6 +6,10 @@
 #include "train/config.h"
 #include "train/trainer.h"
 
+/** A damaged checkpoint makes room for the whole one before it: the next save would put it in the place of
+    that. Of the first process, before any opens the run. GBT_OK or GBT_ERR_IO. */
+gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err);
+
 /**
  * Make of `t` what it was when the run's last checkpoint was made.
  *
@@ -14,7 +18,7 @@
  * goes on where a run of that length would be after as many steps, or after as much time.
  *
  * @param data     [in] the data set; NULL: where the run has it
- * @param latest   [in] the checkpoint; where it is missing or damaged, `previous`
+ * @param latest   [in] the checkpoint; where it is missing, `previous`
  * @param def      [in] as gbt_train() was given it; says how much memory may be used, and when
  *                      checkpoints are made
  * @param strings  [out] keeps strings of t->def, for as long as `t` lives

@@ -29,8 +29,8 @@ typedef struct train_rules {
     bool finds_exposure;         /* exposure is learned where photos differ in it */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
     bool limits_first_scale;     /* an isolated point would start as a floater */
-    double widest; /* a Gaussian is at most so many times as wide as its anchor is far from the
-                      nearest training camera; infinite: no bound */
+    double widest;               /* a Gaussian is at most so many times as wide as its anchor is far from the
+                                    nearest training camera; infinite: no bound */
     bool features_from_colors;   /* first features carry the colour of the nearest point */
     bool background_from_points; /* their mean colour, where the data set has none */
     gbt_voxel_rule voxel;        /* what v is where it is not given */

@@ -95,22 +95,33 @@ static void speed_follow(speed *s, const step_report *r)
     s->known = true;
 }
 
-/* Give the next part of the schedule its share of the time that is left. Resolutions may change inside the
-   part. */
+/* Seconds of a step in this part of the schedule: resolutions may change inside the part, and photos have
+   different sizes. */
+static double expected_step(const trainer *t, const speed *s, int part)
+{
+    enum { PLACES = 8 };
+    double sum = 0;
+    for (size_t v = 0; v < t->train_count; v++) {
+        const gbt_camera camera = photos_camera(&t->photos, t->train_views[v], 0);
+        for (int i = 0; i < PLACES; i++) {
+            const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
+            sum += s->fixed_seconds + s->pixel_seconds * step_size_of(&camera, &t->rules, progress).pixels;
+        }
+    }
+    return sum / (double)(PLACES * t->train_count);
+}
+
+/* Give the next part of the schedule its share of the time that is left. */
 static void pace_extend(trainer *t, const speed *s)
 {
     const int part = t->pace.known;
     const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
-    const gbt_camera camera = photos_camera(&t->photos, t->train_views[0], 0);
-    double per_step = 0;
-    for (int i = 0; i < 8; i++) {
-        const double progress = (part + (i + 0.5) / 8) / PACE_SEGMENTS;
-        const double pixels = step_size_of(&camera, &t->rules, progress).pixels;
-        per_step += (s->fixed_seconds + s->pixel_seconds * pixels) / 8;
-    }
-    /* Before anything has been measured: a few steps, and the rest of the first part's time goes to the
-       next. */
-    const double steps = s->known && per_step > 0 ? seconds / per_step : 20;
+    const double per_step = s->known ? expected_step(t, s, part) : 0;
+    /* Before anything has been measured: what the run's steps took before it was resumed, or a few steps, and
+       the rest of the first part's time goes to the next. */
+    const double steps = per_step > 0  ? seconds / per_step
+                         : t->step > 0 ? seconds * (double)t->step / t->seconds
+                                       : 20.0 / t->def.views;
     t->pace.steps[part] = (uint64_t)fmin(fmax(steps, 1), 1e7);
     t->pace.known++;
 }
@@ -171,7 +182,7 @@ static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_err
         paths->checkpoint);
 }
 
-/* Log, save, stop, evaluate: whatever is due after a step. */
+/* Log, evaluate, save, stop: whatever is due after a step. */
 static gbt_status follow_step(trainer *t, const step_report *report, run_clock *c, const run_paths *paths,
                               run_log *log, gbt_error *err)
 {
@@ -184,12 +195,20 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         GBT_TRY(save_finish(c->saving, err));
     GBT_TRY(check_memory(t, paths, err));
 
-    const bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+    bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+    if (!stop && c->next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[c->next_eval]) {
+        const double before = clock_wall();
+        gbt_error why = {0};
+        const gbt_status status = evaluate_in_passing(t, log, &why);
+        stop = status == GBT_ERR_INTERRUPTED; /* and saved below */
+        if (status != GBT_OK && !stop)
+            return base_fail(err, status, "%s", why.text);
+        c->paused += clock_wall() - before;
+        c->next_eval++;
+    }
     const bool asked = def->save_at_step > 0 && t->step == def->save_at_step;
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);
-    const bool evaluate =
-        c->next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[c->next_eval];
     if (stop || due || asked) {
         GBT_TRY(save_finish(c->saving, err));
         const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
@@ -199,12 +218,6 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
             return base_fail(err, GBT_ERR_INTERRUPTED,
                              "stopped after step %llu; saved in %s (resume goes on)",
                              (unsigned long long)t->step, paths->checkpoint);
-    }
-    if (evaluate) {
-        const double before = clock_wall();
-        GBT_TRY(evaluate_in_passing(t, log, err));
-        c->paused += clock_wall() - before;
-        c->next_eval++;
     }
     return GBT_OK;
 }
@@ -323,6 +336,8 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     if (opened)
         status = file_lock_folder(run, &lock, err);
     const bool locked = opened && status == GBT_OK;
+    if (locked && def->resume)
+        status = resume_mend(paths.checkpoint, paths.checkpoint_previous, err);
     status = cluster_follow(status, err);
     if (status == GBT_OK)
         status = run_in_folder(t, data, run, &paths, def, strings, err);

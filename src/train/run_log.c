@@ -165,7 +165,7 @@ static void add_step(run_sums *s, const step_report *r)
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
 {
     const run_sums *s = &log->row;
-    const double n = s->steps > 0 ? (double)s->steps : 1;
+    const double n = s->steps > 0 ? (double)s->steps : (double)NAN; /* no step since the last row: no means */
     const double values[] = {
 #define X(name, tag, format, value) value,
         ROW_COLUMNS(X)

@@ -82,6 +82,7 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
     def.kind = t->def.init;
+    def.seed = t->def.seed;
     def.fraction = t->def.init_count;
     def.scale = t->def.scale_prior;
     def.balls.max_depth = t->def.max_depth;

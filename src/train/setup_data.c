@@ -224,7 +224,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));
     GBT_TRY(need_valid_pixels(t, err));
     GBT_TRY(try_held_out(t, err));
-    GBT_TRY(checkpoint_hash_photos(&t->scene, &t->photos_hash, err));
+    GBT_TRY(checkpoint_hash_photos(&t->scene, &t->photos_hash, &t->masks_hash, err));
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
     GBT_TRY(choose_exposure(t, err));

@@ -19,13 +19,13 @@ void sky_unpack(const float in[SKY_NUMBERS], trace_settings *s)
     memcpy(s->sky.harmonic, in + 3, sizeof s->sky.harmonic);
 }
 
-void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], double rate, uint64_t age)
+void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], adam_rates rates)
 {
     float values[SKY_NUMBERS], g[SKY_NUMBERS];
     for (int k = 0; k < SKY_NUMBERS; k++)
         g[k] = (float)gradient[k / 3][k % 3];
     sky_pack(s, values);
-    adam_step(values, g, m->first, m->second, SKY_NUMBERS, adam_rates_at(rate, age));
+    adam_step(values, g, m->first, m->second, SKY_NUMBERS, rates);
     sky_unpack(values, s);
 }
 

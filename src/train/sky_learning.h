@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "trace/settings.h"
+#include "train/adam.h"
 
 /** The colour, then the harmonics. */
 enum { SKY_NUMBERS = SH_COUNT * 3 };
@@ -19,8 +20,8 @@ typedef struct sky_moments {
 void sky_pack(const trace_settings *s, float out[SKY_NUMBERS]);
 void sky_unpack(const float in[SKY_NUMBERS], trace_settings *s);
 
-/** One Adam step of s->background and s->sky; `age` >= 1 counts the steps. `gradient` is finite. */
-void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], double rate, uint64_t age);
+/** One Adam step of s->background and s->sky. `gradient` is finite. */
+void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], adam_rates rates);
 
 /** The learning rate at a progress in [0, 1]. */
 double sky_rate(double progress);

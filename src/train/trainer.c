@@ -172,7 +172,7 @@ static void learn_sky(trainer *t, double rate)
     for (int i = 0; i < t->def.views; i++)
         for (int k = 0; k < 3 * SH_COUNT; k++)
             sum[k / 3][k % 3] += t->outcomes[i].d_sky[k / 3][k % 3];
-    sky_step(&t->settings, &t->sky, sum, rate, t->step + 1);
+    sky_step(&t->settings, &t->sky, sum, adam_rates_of_views(rate, t->step + 1, t->def.views));
 }
 
 /* With one view a step, what it says goes straight to where several are added up to. */
@@ -219,6 +219,8 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
         learn_networks(&model, &rates, t->step + 1);
     if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
+    else
+        anchors_zero_learned(&t->gradient.anchors); /* what they miss is lost, as in the reference */
     out->optimizer = stage_lap(&clock);
 
     /* Anchors. */

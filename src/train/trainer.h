@@ -37,8 +37,8 @@ struct trainer {
     train_rules rules;
     scene scene;
     photos photos;
-    uint64_t photos_hash; /* checkpoint_hash_photos() */
-    size_t *train_views;  /* indices into scene.views */
+    uint64_t photos_hash, masks_hash; /* checkpoint_hash_photos() */
+    size_t *train_views;              /* indices into scene.views */
     size_t train_count, test_count;
 
     /* What learns; its gradient and its Adam moments have the same shapes. */
@@ -53,8 +53,8 @@ struct trainer {
 
     gbt_renderer renderer; /* that the model is for */
     float voxel_size;
-    double distance;                    /* from training cameras to anchors, in the median */
-    double extent, first_scale_max;     /* an isolated point would start as a floater */
+    double distance;                      /* from training cameras to anchors, in the median */
+    double extent, first_scale_max;       /* an isolated point would start as a floater */
     float scale_log_min, scale_log_limit; /* every log-scale is kept in here: far outside what a scene needs,
                                              far inside what floats hold */
     float *scale_log_max;                 /* [anchors.count]: and below this (train/widest.h) */

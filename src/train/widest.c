@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/widest.c -- the distance from each anchor to the nearest training camera, as a bound of its scales. */
+/* train/widest.c -- the distance from each anchor to the nearest training camera, as a bound of its scales.
+ */
 #include "train/widest.h"
 
 #include <math.h>

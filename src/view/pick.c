@@ -34,10 +34,10 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
 }
 
 /* Where the ray of a camera of one pixel passes the half of what it sees; 0: nowhere. */
-static gbt_status find_depth(studio *s, const gbt_camera *one, double *depth, gbt_error *err)
+static gbt_status find_depth(studio *s, const gbt_camera *one, int view, double *depth, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(one);
-    const request plain = {.renderer = GBT_RENDERER_TRACE, .preset = GBT_PRESET_DEFAULT};
+    const request plain = {.renderer = GBT_RENDERER_TRACE, .preset = GBT_PRESET_DEFAULT, .view = view};
     render_output_images images = {0};
     GBT_TRY(studio_prepare(s, one, &plain, false, err));
     const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);
@@ -56,7 +56,7 @@ gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *e
         return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)",
                          what->pixel[0], what->pixel[1], camera.width, camera.height);
     if (aim(&camera, what->pixel, &one))
-        GBT_TRY(find_depth(s, &one, &depth, err));
+        GBT_TRY(find_depth(s, &one, what->view, &depth, err));
     if (depth > 0) {
         const double *forward = one.rotation + 6, *origin = s->run->model.origin;
         double point[3];

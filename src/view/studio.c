@@ -169,6 +169,7 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     wanted.renderer = what->renderer;
     wanted.preset = what->preset;
     wanted.known = true;
+    wanted.t_near = what->view >= 0 ? loaded_run_settings(r, (size_t)what->view).t_near : r->settings.t_near;
     memcpy(wanted.background, what->has_background ? what->background : s->background,
            sizeof wanted.background);
     if (memcmp(&wanted, &s->last, sizeof wanted) == 0 && (s->drawn || !draw))
@@ -178,8 +179,10 @@ gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *wh
     memcpy(r->settings.background, wanted.background, sizeof wanted.background);
     r->settings.sky.varies = r->model.sky.varies && !what->has_background;
     trace_settings_preset(what->preset, &r->settings);
-    GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &r->settings, false, err)
-                 : frame_prepare(&r->frame, loaded_run_subject(r), camera, &r->settings, err));
+    trace_settings settings = r->settings;
+    settings.t_near = wanted.t_near;
+    GBT_TRY(draw ? frame_render(&r->frame, loaded_run_subject(r), camera, &settings, false, err)
+                 : frame_prepare(&r->frame, loaded_run_subject(r), camera, &settings, err));
     s->last = wanted;
     s->drawn = draw;
     return GBT_OK;

@@ -16,7 +16,7 @@ typedef struct studio_picture {
     gbt_camera camera; /* scene-local, through the middle of the pixels */
     gbt_renderer renderer;
     gbt_preset preset;
-    float background[3];
+    float background[3], t_near;
     bool known;
 } studio_picture;
 

@@ -176,6 +176,13 @@ static void random_anchors_are_some_of_the_points(void **state)
                 assert_scale(&a, j, expected_spacing(&a, j));
         }
         assert_true(a.count < 100 || (first_half > a.count * 4 / 10 && first_half < a.count * 6 / 10));
+        anchors other;
+        def.seed = 1;
+        assert_ok(anchors_init(position, NULL, 1000, &def, &other, NULL, NULL));
+        assert_true(other.count == a.count &&
+                    (a.count == 1000) ==
+                        (memcmp(other.position, a.position, 3 * a.count * sizeof *a.position) == 0));
+        anchors_free(&other);
         anchors_free(&a);
     }
 }

@@ -16,7 +16,7 @@ enum { ANCHORS = 150, OFFSETS = 2 };
 typedef struct world {
     anchors a;
     decoder d;
-    trace_settings s;
+    trace_settings s, of_cameras[CAMERAS];
     gbt_camera cameras[CAMERAS];
     frame f;
 } world;
@@ -41,6 +41,8 @@ static void make_world(world *w, bool blind)
             memset(w->d.params + parts[head].begin + h * inputs + ANCHOR_FEATURE_DIM, 0, 4 * sizeof(float));
     for (int i = 0; i < CAMERAS; i++)
         w->cameras[i] = ring_camera(i);
+    for (int i = 0; i < CAMERAS; i++)
+        w->of_cameras[i] = w->s;
 }
 
 static void free_world(world *w)
@@ -71,7 +73,7 @@ static void bake_world(world *w, int degree, double prior, bake_result *out)
     bake_def def = bake_def_default();
     def.sh_degree = degree;
     def.prior = prior;
-    assert_ok(bake_cloud(&w->f, &w->a, &w->d, w->cameras, CAMERAS, &w->s, &def, out, NULL));
+    assert_ok(bake_cloud(&w->f, &w->a, &w->d, w->cameras, CAMERAS, w->of_cameras, &def, out, NULL));
     assert_int_equal(out->cloud.count + out->unseen, ANCHORS * OFFSETS);
     assert_int_equal(w->f.draw.pixel_step, 0);
 }
@@ -103,7 +105,7 @@ static void more_functions_and_steps_come_nearer(void **state)
     const double constant = likeness(&w, &flat.cloud), baked = likeness(&w, &r.cloud);
     refine_def def = refine_def_default();
     def.steps = 100;
-    assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r.cloud, NULL));
+    assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &r.cloud, NULL));
     const double refined = likeness(&w, &r.cloud);
     if (!(constant < baked && baked < refined && refined > 35))
         fail_msg("degree 0: %.2f dB, 3: %.2f, refined: %.2f", constant, baked, refined);
@@ -208,7 +210,7 @@ static void same_bits_for_all_threads(void **state)
         bake_world(&w, 2, 0.3, &r);
         refine_def def = refine_def_default();
         def.steps = 5;
-        assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r.cloud, NULL));
+        assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &r.cloud, NULL));
         if (threads == 1)
             first = r.cloud;
         else {
@@ -290,9 +292,9 @@ static void the_most_blended_are_kept(void **state)
     make_world(&w, false);
     bake_result all, some;
     bake_def def = bake_def_default();
-    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &all, NULL));
+    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &all, NULL));
     def.count_max = all.cloud.count / 2;
-    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &some, NULL));
+    assert_ok(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &some, NULL));
     assert_int_equal(some.cloud.count, def.count_max);
     assert_int_equal(some.thinned, all.cloud.count - def.count_max);
     assert_int_equal(some.unseen, all.unseen);
@@ -327,7 +329,7 @@ static void refined_scales_stay_in_their_limits(void **state)
     for (size_t i = 0; i < r.cloud.count; i++)
         r.cloud.scale_log[3 * i + i % 3] = -20;
     def.steps = 1;
-    assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r.cloud, NULL));
+    assert_ok(refine_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &r.cloud, NULL));
     for (size_t i = 0; i < r.cloud.count; i++) {
         const float *s = r.cloud.scale_log + 3 * i, *q = r.cloud.quat + 4 * i;
         const float most = fmaxf(s[0], fmaxf(s[1], s[2])), least = fminf(s[0], fminf(s[1], s[2]));
@@ -335,6 +337,29 @@ static void refined_scales_stay_in_their_limits(void **state)
         assert_near((double)(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), 1, 1e-5);
     }
     gaussian_cloud_free(&r.cloud);
+    free_world(&w);
+}
+
+/* What all cameras but one cut away as too near is what that one sees. */
+static void each_camera_has_its_near_distance(void **state)
+{
+    (void)state;
+    world w;
+    make_world(&w, true);
+    size_t kept[3];
+    for (int round = 0; round < 3; round++) { /* all see all; none sees a thing; one sees all */
+        for (int i = 0; i < CAMERAS; i++)
+            w.of_cameras[i].t_near = round == 0 || (round == 2 && i == 1) ? w.s.t_near : 1e6f;
+        bake_result r;
+        bake_def def = bake_def_default();
+        gbt_error err = {0};
+        const gbt_status status =
+            bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &r, &err);
+        assert_int_equal(status, round == 1 ? GBT_ERR_ARGUMENT : GBT_OK);
+        kept[round] = status == GBT_OK ? r.cloud.count : 0;
+        gaussian_cloud_free(&r.cloud);
+    }
+    assert_true(kept[2] > 0 && kept[2] <= kept[0]);
     free_world(&w);
 }
 
@@ -347,12 +372,12 @@ static void refusals(void **state)
     bake_def def = bake_def_default();
     gbt_error err = {0};
     def.sh_degree = 4;
-    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, &w.s, &def, &r, &err),
+    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, w.cameras, CAMERAS, w.of_cameras, &def, &r, &err),
                      GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "degree 4"));
     def.sh_degree = 3;
     err = (gbt_error){0};
-    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, NULL, 0, &w.s, &def, &r, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(bake_cloud(&w.f, &w.a, &w.d, NULL, 0, w.of_cameras, &def, &r, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "no camera sees"));
     free_world(&w);
 }
@@ -367,6 +392,7 @@ int main(void)
         cmocka_unit_test(a_backdrop_stands_for_the_background),
         cmocka_unit_test(the_most_blended_are_kept),
         cmocka_unit_test(refined_scales_stay_in_their_limits),
+        cmocka_unit_test(each_camera_has_its_near_distance),
         cmocka_unit_test(refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -300,6 +300,8 @@ done
 misuse 2 "--radius: bad value (wanted a number from 0 to 1e+09, got -1)" render tiny -o o --path orbit --radius -1
 misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o --frames 3
 misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
+printf '{"model": "equirectangular", "width": 16384, "height": 8192, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
+misuse 2 "large: a picture of 16384 x 8192 pixels (wanted at most 89478485 pixels)" render tiny -o o --camera large.json
 misuse 2 "film.MOV: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
@@ -322,6 +324,8 @@ if command -v ffmpeg >/dev/null; then
     "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ] &&
         [ "$(cat out)" = film.gif ]
     report $? "a film with ffmpeg" "$(cat err out)"
+    mkdir 12:30 && "$program" render tiny -o 12:30/film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 12:30/film.gif)" = GIF8 ]
+    report $? "a film in a folder with a colon" "$(cat err out)"
 fi
 # ---- the page of a run, made again with the chart of a study
 cp tiny/report.html before.html

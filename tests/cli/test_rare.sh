@@ -72,14 +72,22 @@ report $? "a result folder of photos at another width" "$(cat err out; cat narro
 report $? "wide photos of plain Gaussians" "$(cat err out)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
-mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,0.3],[0,0,0,1]]}' "$1" "$2"; }
-printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 0.8)" "$(frame 0001 -0.8)" >close/transforms.json
+mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,%s],[0,0,0,1]]}' "$1" "$2" "$3"; }
+printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 1 0)" "$(frame 0001 -0.8 0.3)" >close/transforms.json
 "$program" export run n.ply n.glb n.sog n.usda n.spz n.splat near/ --data close --refine 0 >out 2>err && "$program" render run -o near-model --data close >>err 2>&1
 for file in n.ply n.glb n.sog n.usda n.spz n.splat near; do
     "$program" render "$file" -o near-drawn --data close >>err 2>&1 && "$program" compare near-drawn/*.png near-model/*.png --json |
         awk -v file="$file" -F '[:,]' '{for (i = 1; i < NF; i++) if ($i ~ /"psnr"/) printf "^%s/*: .* 1 held-out views: %.2f dB to the model", file, $(i + 1)}' >pattern && grep -q -f pattern out || { cat pattern; break; }
 done >wrong 2>&1 && [ ! -s wrong ] && [ "$(grep -c '^warning: .*does not keep the near distance' err)" = 2 ] && grep -q '^warning: n.spz: the format does not keep the near distance (0\.53[0-9]*), with which' err
 report $? "the printed scores are those of the files, with their near distance or without" "$(cat wrong err out)"
+for k in 0000 0001 0002 0003; do # one of them is nearer to things than all that are trained on
+    echo "$k.png" >held && "$program" train made -o nearest --overwrite --near 1 --iterations 3 --eval-split list=held --quiet >>out 2>&1 &&
+        "$program" render nearest -o nearest-drawn >>out 2>&1 && cmp "nearest-drawn/$k.png" "nearest/renders/test/$k.png" || echo "photo $k"
+done >wrong 2>&1
+[ ! -s wrong ]
+report $? "render draws a held-out photo with its near distance, as it was scored" "$(cat wrong out)"
+"$program" export run fresh/n.ply fresh/ --refine 0 >out 2>err && [ -s fresh/n.ply ] && [ -s fresh/cfg_args ] && ! "$program" export run other/sub/n.ply other/ --refine 0 >>out 2>>err && [ ! -e other ]
+report $? "a file in a result folder that is named first" "$(cat err out)"
 holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
 prim='def ParticleField3DGaussianSplat "one" { point3f[] positions = [(1, 2, 3)] quatf[] orientations = [(1, 0, 0, 0)] float[] opacities = [0.5] float3[] scales = [(1, 1, 1)]'

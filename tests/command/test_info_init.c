@@ -376,7 +376,7 @@ static void json_of_any_bytes(void **state)
 {
     (void)state;
     json_t *value = json_text("a\xff\xfe z");
-    assert_string_equal(json_string_value(value), "a?? z");
+    assert_string_equal(json_string_value(value), "a\xc3\xbf\xc3\xbe z");
     json_decref(value);
     value = json_text("\xc3\xa4");
     assert_string_equal(json_string_value(value), "\xc3\xa4");

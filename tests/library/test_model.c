@@ -251,6 +251,41 @@ static void gradients_point_the_right_way(void **state)
     gbt_model_close(model);
 }
 
+/* Of a needle: what is thinner than a 10,000th of the largest scale is drawn as that, and follows it. */
+static void raised_scales_follow_the_largest(void **state)
+{
+    (void)state;
+    static float rgb[3 * W * H], d_rgb[3 * W * H];
+    const float step = 0.01f, start[3] = {2.5f, -15, -1};
+    float values[3], d_scale[3];
+    gbt_gaussians g = two();
+    g.count = 1;
+    g.scale_log = values;
+    for (int i = 0; i < 3 * W * H; i++)
+        d_rgb[i] = 1;
+    gbt_model *model;
+    memcpy(values, start, sizeof start);
+    assert_ok(gbt_model_from_gaussians(&g, &model, NULL));
+    assert_ok(gbt_model_render(model, &camera, 1, &(gbt_picture){.rgb = rgb}, NULL));
+    assert_ok(gbt_model_gradient(model, d_rgb, NULL, &(gbt_gaussians_gradient){.scale_log = d_scale}, NULL));
+    for (int k = 0; k < 3; k++) {
+        double sum[2] = {0, 0};
+        for (int side = 0; side < 2; side++) {
+            memcpy(values, start, sizeof start);
+            values[k] += side == 0 ? step : -step;
+            assert_ok(gbt_model_set_gaussians(model, &g, NULL));
+            assert_ok(gbt_model_render(model, &camera, 0, &(gbt_picture){.rgb = rgb}, NULL));
+            for (int i = 0; i < 3 * W * H; i++)
+                sum[side] += (double)rgb[i];
+        }
+        const double slope = (sum[0] - sum[1]) / (2 * (double)step);
+        if (!(fabs(slope - (double)d_scale[k]) < 0.02 * fabs((double)d_scale[0]) &&
+              fabs((double)d_scale[0]) > 1e-4))
+            fail_msg("scale %d: %g, by differences %g", k, (double)d_scale[k], slope);
+    }
+    gbt_model_close(model);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_opened),
@@ -260,6 +295,7 @@ int main(void)
                                        cmocka_unit_test(pictures_go_where_they_should),
                                        cmocka_unit_test(one_far_from_the_others),
                                        cmocka_unit_test(what_is_not_rendered),
-                                       cmocka_unit_test(gradients_point_the_right_way)};
+                                       cmocka_unit_test(gradients_point_the_right_way),
+                                       cmocka_unit_test(raised_scales_follow_the_largest)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

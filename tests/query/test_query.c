@@ -270,6 +270,16 @@ static void files_of_balls_and_queries(void **state)
     def.from = ply;
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT, "vertices have no direction");
     err = (gbt_error){0};
+    char lists[] = "/tmp/gbt_query_XXXXXX.ply";
+    write_text(lists, 4,
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float x\nproperty float y\n"
+               "property float z\nend_header\n1 5 2 3\n");
+    def.from = NULL;
+    def.kind = GBT_QUERY_NEAREST;
+    def.at = "0,0,0";
+    assert_refused(gbt_query(lists, &def, stdout, &err), &err, GBT_ERR_FORMAT, "property x is a list");
+    unlink(lists);
+    err = (gbt_error){0};
     def = gbt_query_def_default();
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT, "at, from: neither");
     err = (gbt_error){0};

@@ -146,6 +146,9 @@ static void anchors_rest_in_a_round(void **state)
     bool networks, offsets;
     step_and_compare(&t, &networks, &offsets);
     assert_true(networks && !offsets);
+    for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) /* not kept for the next step */
+        for (size_t i = 0; i < t.anchors.count * anchors_width(&t.anchors, f); i++)
+            assert_true(t.gradient.anchors.field[f][i] == 0);
     step_and_compare(&t, &networks, &offsets);
     assert_true(networks && offsets);
     trainer_free(&t);

@@ -251,6 +251,17 @@ static void what_is_no_pose_is_refused(void **state)
     assert_ok(pose_file_read(in_root("poses.json"), &s, NULL));
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12);
+    s.views[0].name[0] = '\xdf'; /* names of other encodings than UTF-8 stay different */
+    s.views[1].name[0] = '\xe4';
+    snprintf(s.views[1].name + 1, strlen(s.views[1].name), "%s", s.views[0].name + 1);
+    const gbt_camera second = s.views[1].camera;
+    assert_ok(pose_file_write(&s, in_root("poses.json"), NULL));
+    s.views[0].camera.center[1] += 1;
+    s.views[1].camera.center[1] += 1;
+    assert_ok(pose_file_read(in_root("poses.json"), &s, NULL));
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12 &&
+                    fabs(s.views[1].camera.center[k] - second.center[k]) < 1e-12);
     scene_free(&s);
 }
 

@@ -467,5 +467,5 @@ if (words.get("transfer") === "jpeg")
 const rampData = new ImageData(256, 1);
 ramp.forEach((c, i) => rampData.data.set([...c, 255], 4 * i));
 byId("ramp").getContext("2d").putImageData(rampData, 0, 0);
-const training = new Training(byId("training-part"), byId("training-now"), byId("chart"), byId("live"), status => statusChanged(status).catch(fail));
+const training = new Training(byId("training-part"), byId("training-now"), byId("chart"), byId("live"), status => statusChanged(status).catch(error => { training.version = -1; fail(error); }));
 window.gbtrace = { camera, look, pictures, lines, training, changed }; // for the console, and for tests

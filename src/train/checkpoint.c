@@ -72,7 +72,7 @@ static uint64_t hash_of_views(const trainer *t)
     uint64_t hash = HASH_START;
     for (size_t i = 0; i < t->scene.view_count; i++) {
         const scene_view *v = &t->scene.views[i];
-        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[i] : &v->camera;
+        const gbt_camera *camera = poses_given(&t->poses, &t->scene, i);
         char text[512];
         const int length = snprintf(text, sizeof text, "%.300s %d %d %.6g %.6g %.6g", v->name, camera->width,
                                     camera->height, camera->center[0], camera->center[1], camera->center[2]);
@@ -87,7 +87,7 @@ static uint64_t hash_of_geometry(const trainer *t)
     const scene_points *points = &t->scene.points;
     uint64_t hash = hash_bytes(HASH_START, points->position, points->count * 3 * sizeof *points->position);
     for (size_t i = 0; i < t->scene.view_count; i++) {
-        const gbt_camera *c = t->poses.count > 0 ? &t->poses.given[i] : &t->scene.views[i].camera;
+        const gbt_camera *c = poses_given(&t->poses, &t->scene, i);
         double values[2 + GBT_CAMERA_MAX_PARAMS + 9 + 6] = {(double)c->model, (double)c->shutter};
         memcpy(values + 2, c->params, (size_t)gbt_camera_param_count(c->model) * sizeof *values);
         memcpy(values + 2 + GBT_CAMERA_MAX_PARAMS, c->rotation, sizeof c->rotation);

@@ -50,6 +50,11 @@ void pose_learn(float *moment1, float *moment2, const double gradient[POSE_NUMBE
         motion[k] = k < 3 ? unit * (double)step[k] : (double)step[k];
 }
 
+const gbt_camera *poses_given(const poses *p, const scene *s, size_t view)
+{
+    return p->count > 0 ? &p->given[view] : &s->views[view].camera;
+}
+
 bool pose_is_finite(const double gradient[POSE_NUMBERS])
 {
     double sum = 0;

@@ -30,6 +30,9 @@ typedef struct poses {
 gbt_status poses_make(poses *p, const scene *s, size_t count, double unit, gbt_error *err);
 void poses_free(poses *p);
 
+/** The camera of a view as the data set has it, whether poses are learned or not. */
+const gbt_camera *poses_given(const poses *p, const scene *s, size_t view);
+
 /**
  * One Adam step of a single camera; the others are not looked at.
  *

@@ -12,8 +12,7 @@
 static void camera_centers(const trainer *t, float *center)
 {
     for (size_t v = 0; v < t->train_count; v++) {
-        const size_t view = t->train_views[v];
-        const gbt_camera *camera = t->poses.count > 0 ? &t->poses.given[view] : &t->scene.views[view].camera;
+        const gbt_camera *camera = poses_given(&t->poses, &t->scene, t->train_views[v]);
         for (size_t k = 0; k < 3; k++)
             center[3 * v + k] = (float)camera->center[k];
     }

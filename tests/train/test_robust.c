@@ -752,19 +752,24 @@ static void signal_at_warning(const gbt_event *event, void *context)
         raise(SIGTERM);
 }
 
-/* The warning, that poses of training are not there, comes when the run is opened. */
-static void making_small_stops_at_a_signal(void **state)
+/* A run that raises a signal when it is opened: with the warning that poses of training are not there. */
+static void train_for_a_signal(const char *run)
 {
-    (void)state;
-    const char *run = in_root("large");
-    const gbt_compress_def small = gbt_compress_def_default();
     gbt_train_def def = run_def();
     def.iterations = 3;
     def.refine_poses = true;
     train_ok(tiny, run, &def);
     assert_int_equal(remove(joined(run, "poses.json")), 0);
-    gbt_error err = {0};
     gbt_listen(signal_at_warning, NULL);
+}
+
+static void making_small_stops_at_a_signal(void **state)
+{
+    (void)state;
+    const char *run = in_root("large");
+    const gbt_compress_def small = gbt_compress_def_default();
+    gbt_error err = {0};
+    train_for_a_signal(run);
     assert_int_equal(gbt_compress(run, &small, in_root("small.gbt"), NULL, &err), GBT_ERR_INTERRUPTED);
     be_quiet();
     assert_string_equal(err.text, "stopped while the model was made small (compress, or resume of a "
@@ -773,19 +778,13 @@ static void making_small_stops_at_a_signal(void **state)
     assert_ok(gbt_compress(run, &small, in_root("small.gbt"), NULL, NULL));
 }
 
-/* The warning, that poses of training are not there, comes when the run is opened. */
 static void scoring_stops_at_a_signal(void **state)
 {
     (void)state;
     const char *run = in_root("unscored");
     const gbt_evaluate_def score = gbt_evaluate_def_default();
-    gbt_train_def def = run_def();
-    def.iterations = 3;
-    def.refine_poses = true;
-    train_ok(tiny, run, &def);
-    assert_int_equal(remove(joined(run, "poses.json")), 0);
     gbt_error err = {0};
-    gbt_listen(signal_at_warning, NULL);
+    train_for_a_signal(run);
     assert_int_equal(gbt_evaluate(run, &score, &err), GBT_ERR_INTERRUPTED);
     be_quiet();
     assert_string_equal(err.text, "stopped while held-out views were scored (eval scores the run)");

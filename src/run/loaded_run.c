@@ -10,6 +10,7 @@
 #include "base/choice.h"
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/hash.h"
 #include "base/log.h"
 #include "data/cameras_json.h"
 #include "data/gaussian_file.h"
@@ -284,13 +285,11 @@ void loaded_run_view_name(const scene_view *view, char *out, size_t size)
    written ".tmp". 255 bytes are what file systems take. */
 enum { FILE_NAME_MAX = 200, FILE_NAME_KEPT = 180 };
 
-/* A long name ends by a hash of all of it (FNV-1a). */
+/* A long name ends by a hash of all of it. */
 static void shorten(const char *name, char *out, size_t size)
 {
     size_t kept = FILE_NAME_KEPT;
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (const char *c = name; *c != '\0'; c++)
-        hash = (hash ^ (unsigned char)*c) * 0x100000001b3u;
+    const uint64_t hash = hash_bytes(HASH_START, name, strlen(name));
     while (kept > 0 && ((unsigned char)out[kept] & 0xc0) == 0x80) /* never within a letter of UTF-8 */
         kept--;
     snprintf(out + kept, size - kept, "-%016llx", (unsigned long long)hash);

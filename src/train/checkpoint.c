@@ -8,6 +8,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "io/container.h"
 #include "io/row_sections.h"
@@ -55,18 +56,7 @@ static gbt_status read_anchors(const container *c, const char *prefix, size_t ro
                             err);
 }
 
-#define HASH_START 0xcbf29ce484222325u
-
-/* FNV-1a, goes on from `hash`. */
-static uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
-{
-    const unsigned char *at = bytes;
-    for (size_t i = 0; i < count; i++)
-        hash = (hash ^ at[i]) * 0x100000001b3u;
-    return hash;
-}
-
-/* Of what tells one data set from another: the names, sizes and centres of its views. */
+/* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
 static uint64_t hash_of_views(const trainer *t)
 {
     uint64_t hash = HASH_START;

@@ -68,8 +68,8 @@ static const char *const as_it_is[] = {"", NULL}, *const photo_endings[] = {"", 
 static gbt_status find_mask(const transforms_frame *s, const char *folder, char **out, gbt_error *err)
 {
     *out = NULL;
-    const json_t *value = json_object_get(s->frame, "mask_path");
-    if (value == NULL || json_is_null(value))
+    const json_t *value = transforms_value(s->frame, "mask_path");
+    if (value == NULL)
         return GBT_OK;
     if (!json_is_string(value))
         return transforms_fail(s, err, "wanted a string", "mask_path");
@@ -86,7 +86,7 @@ static gbt_status find_mask(const transforms_frame *s, const char *folder, char 
 
 static gbt_status read_frame(const transforms_frame *s, const char *folder, raw_scene *out, gbt_error *err)
 {
-    const json_t *value = json_object_get(s->frame, "file_path");
+    const json_t *value = transforms_value(s->frame, "file_path");
     if (!json_is_string(value))
         return transforms_fail(s, err, "wanted a string", "file_path");
     char name[NAME_SIZE], path[PATH_SIZE];
@@ -118,7 +118,7 @@ static gbt_status read_frame(const transforms_frame *s, const char *folder, raw_
 /* With a list train_filenames, every view that is not in it is held out. */
 static gbt_status read_split(const source_file *file, const json_t *root, raw_scene *out, gbt_error *err)
 {
-    const json_t *list = json_object_get(root, "train_filenames");
+    const json_t *list = transforms_value(root, "train_filenames");
     if (list == NULL)
         return GBT_OK;
     json_t *names = json_object();
@@ -145,7 +145,7 @@ static gbt_status read_split(const source_file *file, const json_t *root, raw_sc
 static gbt_status read_root(const source_file *file, const json_t *root, const char *folder,
                             bool may_be_empty, raw_scene *out, char **points_name, gbt_error *err)
 {
-    const json_t *frames = json_object_get(root, "frames");
+    const json_t *frames = transforms_value(root, "frames");
     if (frames == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no frames (wanted a transforms.json)", file->name);
     if (!json_is_array(frames) || (json_array_size(frames) == 0 && !may_be_empty))
@@ -163,8 +163,8 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
                          file->name, out->photos_missing, first);
     }
     GBT_TRY(read_split(file, root, out, err));
-    const json_t *points = json_object_get(root, "ply_file_path");
-    if (points == NULL || json_is_null(points))
+    const json_t *points = transforms_value(root, "ply_file_path");
+    if (points == NULL)
         return GBT_OK;
     if (!json_is_string(points))
         return base_fail(err, GBT_ERR_FORMAT, "%s: ply_file_path: wanted a string", file->name);

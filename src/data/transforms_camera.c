@@ -11,17 +11,11 @@
 #include "base/image.h"
 #include "base/vec.h"
 
-static const json_t *find(const transforms_frame *s, const char *key)
-{
-    const json_t *value = json_object_get(s->frame, key);
-    return value != NULL ? value : json_object_get(s->top, key);
-}
-
 /* A number when the key is there; `*found` says whether it is. */
 static gbt_status find_number(const transforms_frame *s, const char *key, double *out, bool *found,
                               gbt_error *err)
 {
-    const json_t *value = find(s, key);
+    const json_t *value = transforms_find(s, key);
     *found = value != NULL;
     if (value == NULL)
         return GBT_OK;
@@ -52,7 +46,6 @@ static gbt_status find_size(const transforms_frame *s, const char *key, int *out
 static gbt_status focal_from_angle(const transforms_frame *s, char axis, int size, double *focal,
                                    gbt_error *err)
 {
-    const double pi = 3.14159265358979;
     double value = 0, unit = 1;
     bool found;
     char key[16];
@@ -61,13 +54,13 @@ static gbt_status focal_from_angle(const transforms_frame *s, char axis, int siz
     if (!found) {
         snprintf(key, sizeof key, "%c_fov", axis);
         GBT_TRY(find_number(s, key, &value, &found, err));
-        unit = pi / 180;
+        unit = PI / 180;
     }
     *focal = 0;
     if (!found)
         return GBT_OK;
     const double angle = value * unit;
-    if (!(angle > 0 && angle < pi))
+    if (!(angle > 0 && angle < PI))
         return base_fail(err, GBT_ERR_FORMAT, "%s: frame %zu: %s: out of range (wanted %s, got %g)",
                          s->file->name, s->frame_index, key, unit == 1 ? "0..pi radians" : "0..180 degrees",
                          value);
@@ -91,11 +84,11 @@ static gbt_status find_kind(const transforms_frame *s, lens_kind *kind, bool *is
 {
     gbt_camera_model model;
     *is_opencv = false;
-    const json_t *value = find(s, "camera_model");
+    const json_t *value = transforms_find(s, "camera_model");
     if (value == NULL) {
-        *kind = json_is_true(find(s, "is_fisheye"))        ? LENS_FISHEYE
-                : json_is_true(find(s, "equirectangular")) ? LENS_EQUIRECTANGULAR
-                                                           : LENS_PERSPECTIVE;
+        *kind = json_is_true(transforms_find(s, "is_fisheye"))        ? LENS_FISHEYE
+                : json_is_true(transforms_find(s, "equirectangular")) ? LENS_EQUIRECTANGULAR
+                                                                      : LENS_PERSPECTIVE;
         return GBT_OK;
     }
     if (!json_is_string(value))
@@ -119,7 +112,7 @@ static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_CO
     static const char *const keys[LENS_COUNT] = {"k1", "k2", "k3", "k4", "p1", "p2"};
     *any = false;
     memset(lens, 0, LENS_COUNT * sizeof *lens);
-    const json_t *list = find(s, "distortion_params");
+    const json_t *list = transforms_find(s, "distortion_params");
     if (list != NULL && (!json_is_array(list) || json_array_size(list) != LENS_COUNT))
         return transforms_fail(s, err, "wanted 6 numbers: k1 k2 k3 k4 p1 p2", "distortion_params");
     for (size_t i = 0; i < LENS_COUNT; i++) {

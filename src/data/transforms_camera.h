@@ -15,6 +15,21 @@ typedef struct transforms_frame {
     size_t frame_index;
 } transforms_frame;
 
+/** The value of a key; NULL when the key is missing or its value is null, as writers say that there is none.
+ */
+static inline const json_t *transforms_value(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    return json_is_null(value) ? NULL : value;
+}
+
+/** The same, of the frame, or else of the top level. */
+static inline const json_t *transforms_find(const transforms_frame *s, const char *key)
+{
+    const json_t *value = transforms_value(s->frame, key);
+    return value != NULL ? value : transforms_value(s->top, key);
+}
+
 static inline gbt_status transforms_fail(const transforms_frame *s, gbt_error *err, const char *text,
                                          const char *key)
 {

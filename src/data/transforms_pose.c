@@ -27,7 +27,7 @@ static void orthonormalize(double m[9])
 
 static gbt_status read_matrix(const transforms_frame *s, const char *key, double m[4][4], gbt_error *err)
 {
-    const json_t *rows = json_object_get(s->frame, key);
+    const json_t *rows = transforms_value(s->frame, key);
     if (rows == NULL)
         return transforms_fail(s, err, "is missing", key);
     const size_t row_count = json_is_array(rows) ? json_array_size(rows) : 0;
@@ -94,9 +94,7 @@ static gbt_status read_pose(const transforms_frame *s, const char *key, gbt_came
 static gbt_status read_times(const transforms_frame *s, double times[3], gbt_error *err)
 {
     static const char key[] = "rolling_shutter";
-    const json_t *list = json_object_get(s->frame, key);
-    if (list == NULL)
-        list = json_object_get(s->top, key);
+    const json_t *list = transforms_find(s, key);
     for (size_t i = 0; i < 3; i++)
         times[i] = 0;
     if (list == NULL)
@@ -120,8 +118,8 @@ static gbt_status read_times(const transforms_frame *s, double times[3], gbt_err
 gbt_status transforms_pose(const transforms_frame *s, gbt_camera *camera, gbt_error *err)
 {
     static const char first[] = "transform_matrix_start", last[] = "transform_matrix_end";
-    const bool has_first = json_object_get(s->frame, first) != NULL,
-               has_last = json_object_get(s->frame, last) != NULL;
+    const bool has_first = transforms_value(s->frame, first) != NULL,
+               has_last = transforms_value(s->frame, last) != NULL;
     if (!has_first && !has_last)
         return read_pose(s, "transform_matrix", camera, err);
     gbt_camera start = {0}, end = {0};

@@ -106,19 +106,6 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
     return (row_response){r.t, response_alpha(&g, r.d2), vfloat16_set1(0)};
 }
 
-/* Rows that are cut at the near depth on some ray come first, by index, which is how their hits at that very
-   depth are ordered. Their keys are 0. */
-static void order_cut_rows(const tile_list *list, list_rows *rows)
-{
-    for (size_t i = 1; i < rows->count && rows->key[rows->order[i]] == 0; i++) {
-        const uint32_t row = rows->order[i], id = list->row[rows->number[row]].id;
-        size_t j = i;
-        for (; j > 0 && list->row[rows->number[rows->order[j - 1]]].id > id; j--)
-            rows->order[j] = rows->order[j - 1];
-        rows->order[j] = row;
-    }
-}
-
 static inline vfloat16 count_where(vmask16 m, vfloat16 count)
 {
     return vfloat16_add_where(m, count, vfloat16_set1(1));
@@ -172,6 +159,16 @@ static void order_by_index(const tile_list *list, list_rows *rows, size_t first,
     for (size_t i = 0; i < count; i++)
         sorted[i] = rows->order[first + (uint32_t)order[i]];
     memcpy(rows->order + first, sorted, count * sizeof *sorted);
+}
+
+/* Rows that are cut at the near depth on some ray come first, by index, which is how their hits at that very
+   depth are ordered. Their keys are 0. */
+static void order_cut_rows(const tile_list *list, list_rows *rows)
+{
+    size_t cut = 0;
+    while (cut < rows->count && rows->key[rows->order[cut]] == 0)
+        cut++;
+    order_by_index(list, rows, 0, cut);
 }
 
 /* Gaussians of one shape in one place are at one depth on all rays, however opaque each is: by index. */

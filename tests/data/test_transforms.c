@@ -67,6 +67,16 @@ static json_case json_cases[] = {
      SIZED
      "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [[1,0,0,null],[0,1,0,2],[0,0,1,3]]}]}",
      BAD, "something that is not a number"},
+    {"keys that are null are not there",
+     "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"fl_y\": null, \"camera_angle_x\": null, \"k1\": null, "
+     "\"camera_model\": null, \"distortion_params\": null, \"rolling_shutter\": null, "
+     "\"train_filenames\": null, \"ply_file_path\": null, \"frames\": [{\"file_path\": \"a.png\", "
+     "\"w\": null, \"mask_path\": null, \"transform_matrix_start\": null, "
+     "\"transform_matrix\": [[1,0,0,1],[0,1,0,2],[0,0,1,3]]}]}",
+     GBT_OK, NULL},
+    {"46 a matrix that is null",
+     SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": null}]}", BAD,
+     "frame 0: transform_matrix: is missing"},
     {"46 a null row",
      SIZED "\"frames\": [{\"file_path\": \"a.png\", \"transform_matrix\": [null,[0,1,0,2],[0,0,1,3]]}]}", BAD,
      "3 or 4 rows of 4"},

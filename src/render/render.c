@@ -346,6 +346,8 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
                          def->height);
     if (video_named(out) && def->outputs != NULL)
         return base_fail(err, GBT_ERR_ARGUMENT, "outputs: not with a film (wanted a folder)");
+    if (video_named(out) && def->format != GBT_PICTURE_PNG)
+        return base_fail(err, GBT_ERR_ARGUMENT, "format: not with a film (wanted a folder)");
     return GBT_OK;
 }
 

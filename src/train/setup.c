@@ -98,6 +98,10 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def,
                          &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;
+    if (t->anchors.count > t->def.max_anchors)
+        log_warn("max_anchors: the sparse points make %zu anchors, and so none is added to them (wanted at "
+                 "most %llu)",
+                 t->anchors.count, (unsigned long long)t->def.max_anchors);
     return t->rules.features_from_colors && points->has_color ? start_features(t, err) : GBT_OK;
 }
 

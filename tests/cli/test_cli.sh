@@ -309,6 +309,7 @@ for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--p
     misuse 2 "--output is missing (with --data, --downscale, --format, --insert, --path, --preset or --renderer nothing goes into tiny/renders)" render tiny $other
 done
 misuse 2 "--outputs: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
+misuse 2 "--format: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --format exr
 misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
 for bad in 20x10x5 -3x4; do
     misuse 2 "--size: bad value (wanted WxH like 1280x720, got $bad)" render tiny -o o --path orbit --size="$bad"

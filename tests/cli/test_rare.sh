@@ -32,6 +32,7 @@ holds "a time before the first step" 0 '^warning: eval_at: .*times left out: 1$'
 holds "times that fall" 2 '^error: --eval-at: "1s" (wanted up to [0-9]* rising times' train made -o none --eval-at 2s,1s
 holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --eval-at soon
 holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"
+holds "more anchors at the start than are wanted" 0 '^warning: max_anchors: the sparse points make [0-9]* anchors, and so none is added to them (wanted at most 5)$' train made -o many --iterations 3 --max-anchors 5
 mkdir wide && cp -r made/* wide && holds "a sky that is learned" 0 '^2 held-out views: ' train wide -o wide/run --iterations 5 --background sky
 holds "and what it was trained with" 0 '^  config    background = sky$' info wide/run
 printf '0001.png\n0005.png\n' >names.txt && "$program" train made -o listed --iterations 3 --eval-split list=names.txt --quiet >out 2>err && rm names.txt &&

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/paged.h"
@@ -79,12 +80,6 @@ static gbt_status check_points(builder *b, gbt_error *err)
                      number_at(b->radius, i));
 }
 
-static int compare_double(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Outliers must not cost the others their digits in Embree's float32: the origin is the median, and the
    quartiles are at about 1. Of a sample; boxes in double make the answers right whatever Embree sees. */
 static gbt_status find_frame(builder *b, gbt_error *err)
@@ -96,7 +91,7 @@ static gbt_status find_frame(builder *b, gbt_error *err)
     for (size_t j = 0; j < 3; j++) {
         for (size_t i = 0; i < samples; i++)
             value[i] = number_at(b->position, 3 * i * step + j);
-        qsort(value, samples, sizeof *value, compare_double);
+        qsort(value, samples, sizeof *value, compare_doubles);
         b->origin[j] = value[samples / 2];
         spread = fmax(spread, value[samples - 1 - samples / 4] - value[samples / 4]);
         far = fmax(far, value[samples - 1] - value[0]);

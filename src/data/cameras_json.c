@@ -53,6 +53,16 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
     return raw_check_camera(out, place, err);
 }
 
+/* 3DGS calls the photos of Blender's scenes by their names without folders: "r_0" of the test and of the
+   training views. */
+static bool is_taken(const scene *s, const char *name)
+{
+    for (size_t i = 0; i < s->view_count; i++)
+        if (strcmp(s->views[i].name, name) == 0)
+            return true;
+    return false;
+}
+
 static gbt_status read_list(const json_t *list, const char *path, scene *out, gbt_error *err)
 {
     const size_t count = json_array_size(list);
@@ -64,9 +74,10 @@ static gbt_status read_list(const json_t *list, const char *path, scene *out, gb
     for (size_t i = 0; i < count; i++) {
         const json_t *entry = json_array_get(list, i);
         const char *given = json_string_value(json_object_get(entry, "img_name"));
-        char number[32];
-        snprintf(number, sizeof number, "%05zu", i);
-        const char *name = given != NULL ? given : number;
+        char numbered[RAW_NAME_LIMIT + 32];
+        snprintf(numbered, sizeof numbered, "%.*s%s%05zu", RAW_NAME_LIMIT, given != NULL ? given : "",
+                 given != NULL ? "-" : "", i);
+        const char *name = given != NULL && !is_taken(out, given) ? given : numbered;
         const raw_place place = {path, RAW_MARK_FRAME, i};
         scene_view *view = &out->views[i];
         GBT_TRY(raw_check_name(name, strlen(name), place, err));

@@ -91,32 +91,11 @@ static size_t camera_count(const model *m)
     return seen;
 }
 
-/* Unit quaternion w x y z, w >= 0, and translation -R c. The largest of the four is found first, so nothing
-   small is divided by. */
+/* Unit quaternion w x y z, w >= 0, and translation -R c. */
 static void pose_of(const gbt_camera *camera, double q[4], double t[3])
 {
     const double *m = camera->rotation;
-    const double squares[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
-                               1 - m[0] - m[4] + m[8]};
-    int largest = 0;
-    for (int i = 1; i < 4; i++)
-        if (squares[i] > squares[largest])
-            largest = i;
-    const double twice = sqrt(squares[largest]), f = 0.5 / twice;
-    switch (largest) {
-    case 0:
-        q[0] = 0.5 * twice, q[1] = (m[7] - m[5]) * f, q[2] = (m[2] - m[6]) * f, q[3] = (m[3] - m[1]) * f;
-        break;
-    case 1:
-        q[0] = (m[7] - m[5]) * f, q[1] = 0.5 * twice, q[2] = (m[1] + m[3]) * f, q[3] = (m[2] + m[6]) * f;
-        break;
-    case 2:
-        q[0] = (m[2] - m[6]) * f, q[1] = (m[1] + m[3]) * f, q[2] = 0.5 * twice, q[3] = (m[5] + m[7]) * f;
-        break;
-    default:
-        q[0] = (m[3] - m[1]) * f, q[1] = (m[2] + m[6]) * f, q[2] = (m[5] + m[7]) * f, q[3] = 0.5 * twice;
-        break;
-    }
+    dquat_of_matrix(m, q);
     if (q[0] < 0)
         for (int i = 0; i < 4; i++)
             q[i] = -q[i];

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 
 enum { AXIS_BITS = 21, SHELLS = 64 };
@@ -25,15 +26,9 @@ static int by_code(const void *a, const void *b)
     return (x->row > y->row) - (x->row < y->row);
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 float gaussian_median(float *values, size_t count)
 {
-    qsort(values, count, sizeof *values, by_value);
+    qsort(values, count, sizeof *values, compare_floats);
     return values[count / 2];
 }
 

@@ -7,17 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 
 enum { AXIS_STEPS = 6, WIDTH_MAX = 64 };
 
 /* ---- numbers ---- */
-
-static int by_value(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
 
 /* How many of the sorted values are below one. */
 static size_t count_below(const float *sorted, size_t count, double value)
@@ -68,7 +63,7 @@ static void cut_ranges(const float *sorted, const double (*sums)[2], size_t coun
     }
     for (size_t k = 0; k < PALETTE_LEVELS; k++)
         levels[k] = (float)ranges[k < used ? k : 0].mean;
-    qsort(levels, PALETTE_LEVELS, sizeof *levels, by_value);
+    qsort(levels, PALETTE_LEVELS, sizeof *levels, compare_floats);
 }
 
 gbt_status palette_levels(const float *values, size_t count, float levels[PALETTE_LEVELS], gbt_error *err)
@@ -78,7 +73,7 @@ gbt_status palette_levels(const float *values, size_t count, float levels[PALETT
     const gbt_status status = sorted == NULL || sums == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK) {
         memcpy(sorted, values, count * sizeof *sorted);
-        qsort(sorted, count, sizeof *sorted, by_value);
+        qsort(sorted, count, sizeof *sorted, compare_floats);
         for (size_t i = 0; i < count; i++) {
             const double value = (double)sorted[i];
             sums[i + 1][0] = sums[i][0] + value;

@@ -298,7 +298,9 @@ gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *e
         if (k >= 3) {
             rows.has_color = rows.has_color && usable;
             const bool is_whole = usable && p->type != PLY_FLOAT && p->type != PLY_DOUBLE;
-            rows.color_scale[k - 3] = is_whole ? ldexp(1, 8 * (int)type_bytes[p->type]) - 1 : 1;
+            const bool has_sign =
+                usable && (p->type == PLY_INT8 || p->type == PLY_INT16 || p->type == PLY_INT32);
+            rows.color_scale[k - 3] = is_whole ? ldexp(1, 8 * (int)type_bytes[p->type] - has_sign) - 1 : 1;
         }
     }
     cursor c = {.file = file, .at = header.data_at};

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/camera_lens.h"
 #include "base/camera_model.h"
 #include "base/compare.h"
 #include "base/fail.h"
@@ -173,6 +174,10 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
         if (camera->params[k] <= 0)
             return raw_fail(err, place, "focal length of camera model %s is not positive (got %g)",
                             gbt_camera_model_name(camera->model), camera->params[k]);
+    camera_lens lens;
+    if (!camera_lens_prepare(camera, &lens))
+        return raw_fail(err, place, "no lens of camera model %s has these parameters",
+                        gbt_camera_model_name(camera->model));
     return GBT_OK;
 }
 

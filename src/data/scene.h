@@ -55,7 +55,7 @@ typedef struct scene {
     char source[32];  /* "colmap-bin", "colmap-txt", "transforms", "blender" or "ply" */
     double origin[3]; /* subtracted from every coordinate: world = local + origin */
     size_t view_count;
-    scene_view *views; /* sorted by name (bytes) */
+    scene_view *views; /* sorted by name (bytes); of a cameras.json in its order */
     scene_points points;
     size_t points_dropped;   /* non-finite ones */
     size_t photos_missing;   /* views left out because their photo is not there */

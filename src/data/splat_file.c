@@ -9,47 +9,23 @@
 
 enum { ROW_BYTES = 32 };
 
-/* False when the row is not usable. */
-static bool read_row(cursor *c, gaussian_cloud *out, size_t i)
+static void read_row(cursor *c, gaussian_cloud *out)
 {
-    bool fine = true;
-    float largest = 0;
-    for (size_t k = 0; k < 3; k++) {
-        out->mean[3 * i + k] = cursor_f32(c);
-        fine = fine && fabsf(out->mean[3 * i + k]) < 1e12f;
-    }
-    float scale[3];
-    for (size_t k = 0; k < 3; k++) {
-        scale[k] = cursor_f32(c);
-        fine = fine && scale[k] >= 0 && scale[k] < 1e12f;
-        largest = fmaxf(largest, scale[k]);
-    }
-    bool clamped = false;
-    for (size_t k = 0; k < 3; k++) {
-        const float least = fmaxf(largest / (float)GAUSSIAN_SCALE_RATIO, 1e-12f);
-        clamped = clamped || scale[k] < least;
-        out->scale_log[3 * i + k] = logf(fmaxf(scale[k], least));
-    }
-    float *sh = out->sh + i * GAUSSIAN_SH_COUNT * 3;
-    memset(sh, 0, GAUSSIAN_SH_COUNT * 3 * sizeof *sh);
+    gaussian_row row = {0};
     for (size_t k = 0; k < 3; k++)
-        sh[k] = (float)(((double)cursor_uint(c, 1) / 255 - 0.5) / GAUSSIAN_SH_0);
-    out->opacity[i] = (float)cursor_uint(c, 1) / 255;
-    float q[4], square = 0;
-    for (int k = 0; k < 4; k++) {
-        q[k] = ((float)cursor_uint(c, 1) - 128) / 128;
-        square += q[k] * q[k];
-    }
+        row.mean[k] = (double)cursor_f32(c);
+    for (size_t k = 0; k < 3; k++)
+        row.scale_log[k] = log((double)cursor_f32(c)); /* of 0: flat; of what is less, NaN */
+    for (size_t k = 0; k < 3; k++)
+        row.sh[0][k] = ((double)cursor_uint(c, 1) / 255 - 0.5) / GAUSSIAN_SH_0;
+    row.opacity = (double)cursor_uint(c, 1) / 255;
     for (size_t k = 0; k < 4; k++)
-        out->quat[4 * i + k] = square > 0 ? q[k] / sqrtf(square) : k == 0;
-    out->identity_rotations += fine && !(square > 0);
-    out->scales_clamped += fine && clamped;
-    return fine;
+        row.quat[k] = ((double)cursor_uint(c, 1) - 128) / 128;
+    gaussian_cloud_add(out, &row);
 }
 
 /*
- * Read one: rows with a value that is not finite, or a scale that is not above 0, are dropped and counted;
- * ratios of scales are limited.
+ * Read one, by the rules of gaussian_cloud_add().
  *
  * @param out [out] sh_degree 0; free with gaussian_cloud_free(); zeroed on failure
  * @return GBT_OK; GBT_ERR_FORMAT (not a multiple of 32 bytes, no usable Gaussian); GBT_ERR_NO_MEMORY
@@ -64,12 +40,8 @@ static gbt_status read_splat(const source_file *file, gaussian_cloud *out, gbt_e
     GBT_TRY(gaussian_cloud_alloc(out, rows, err));
     out->count = 0;
     cursor c = {.file = file};
-    for (size_t i = 0; i < rows; i++) {
-        if (read_row(&c, out, out->count))
-            out->count++;
-        else
-            out->dropped++;
-    }
+    for (size_t i = 0; i < rows; i++)
+        read_row(&c, out);
     if (out->count > 0)
         return GBT_OK;
     gaussian_cloud_free(out);

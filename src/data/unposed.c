@@ -8,6 +8,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/shell_word.h"
 
 enum { PATH_SIZE = 4096 };
 
@@ -65,9 +66,8 @@ gbt_status unposed_check(const char *path, gbt_error *err)
     const bool film = !file_is_folder(path) && is_film(path);
     if (!film && !unposed_has_photos(path, 1) && !has_files(path, 1, unposed_is_other_photo))
         return GBT_OK;
-    const char *quote =
-        strpbrk(path, " &;()") != NULL ? "'" : ""; /* as a shell takes the name for one word */
+    char word[PATH_SIZE];
     return base_fail(err, GBT_ERR_FORMAT,
-                     "%s: %s without camera poses (find them with: gbtrace pose %s%s%s -o DATA)", path,
-                     film ? "a film" : "photos", quote, path, quote);
+                     "%s: %s without camera poses (find them with: gbtrace pose %s -o DATA)", path,
+                     film ? "a film" : "photos", shell_word(path, word, sizeof word));
 }

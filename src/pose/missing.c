@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
@@ -89,12 +90,6 @@ static double sharpness_of(const job *j, size_t photo)
     return sharpness;
 }
 
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* The median of some registered photos. */
 static double usual_sharpness(const job *j, const bool *registered, size_t count)
 {
@@ -106,7 +101,7 @@ static double usual_sharpness(const job *j, const bool *registered, size_t count
         if (seen++ * SAMPLE / count >= used && used < SAMPLE)
             values[used++] = sharpness_of(j, i);
     }
-    qsort(values, used, sizeof *values, by_value);
+    qsort(values, used, sizeof *values, compare_doubles);
     return used > 0 ? values[used / 2] : 0;
 }
 

@@ -389,7 +389,10 @@ static void name_length_limit(void **state)
     }
 }
 
-/* Every model of the table, with its own number of parameters. */
+/* Usable by every model. */
+static double param_value(int k) { return 0.25 + (k < 4 ? k : 0.01 * k); }
+
+/* Every model of the table, with its own number of parameters; those of some have a range. */
 static void all_models(void **state)
 {
     (void)state;
@@ -400,7 +403,7 @@ static void all_models(void **state)
         memcpy(camera.bytes + 12, &id, 4);
         const int count = gbt_camera_param_count((gbt_camera_model)id);
         for (int k = 0; k < count; k++)
-            sink_put_f64(&camera, 0.25 + k);
+            sink_put_f64(&camera, param_value(k));
         colmap_files files = files_of(seed);
         files.cameras.bytes = camera.bytes;
         files.cameras.size = camera.size;
@@ -408,9 +411,17 @@ static void all_models(void **state)
         must(colmap_bin_read(&files, &raw, &err));
         assert_int_equal(raw.views[1].camera.model, id);
         for (int k = 0; k < count; k++)
-            assert_true(raw.views[1].camera.params[k] == 0.25 + k);
+            assert_true(raw.views[1].camera.params[k] == param_value(k));
         assert_int_equal(raw.trailing_bytes, 0);
         raw_free(&raw);
+        if (id == GBT_CAMERA_FOV || id == GBT_CAMERA_EUCM) {
+            gbt_error err = {0};
+            const double beyond = 4;
+            memcpy(camera.bytes + 32 + 4 * 8, &beyond, 8);
+            assert_int_equal(colmap_bin_read(&files, &raw, &err), GBT_ERR_FORMAT);
+            assert_non_null(strstr(err.text, "cameras.bin@8: no lens of camera model"));
+            raw_free(&raw);
+        }
         sink_free(&camera);
         free_seed(seed);
     }

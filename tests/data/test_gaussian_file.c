@@ -94,6 +94,27 @@ static void spz_keeps_its_steps(void **state)
     }
 }
 
+/* The rules are those of every format: scales of 0 are flat, and what is less is left out. */
+static void splat_scales(void **state)
+{
+    gaussian_cloud a, b;
+    make_cloud(&a, 3, 0);
+    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
+    const float scales[3][3] = {{1, 0, 2}, {1, -1, 2}, {0, 0, 0}};
+    for (size_t i = 0; i < 3; i++)
+        memcpy(bytes + 32 * i + 12, scales[i], sizeof scales[i]);
+    must(file_write_atomic(inside(*state, "a.splat", 0), bytes, size, &err));
+    mem_free(bytes);
+    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    assert_true(b.count == 2 && b.dropped == 1 && b.scales_clamped == 2);
+    assert_true(b.scale_log[0] == 0 && b.scale_log[1] < -8 && fabsf(b.scale_log[2] - logf(2)) < 1e-6f);
+    gaussian_cloud_free(&a);
+    gaussian_cloud_free(&b);
+}
+
 /* By rows of the file: the writer sorts them. */
 static void splat_keeps_one_color(void **state)
 {
@@ -384,6 +405,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(ply_says_how_it_is_drawn, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(near_distances_are_kept, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_keeps_its_steps, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(splat_scales, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(splat_keeps_one_color, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(glb_round_trip, make_temporary, remove_temporary),

@@ -172,9 +172,9 @@ static void types_and_orders(void **state)
     static const char *const names[] = {"char", "uint8",  "short",   "uint16",
                                         "int",  "uint32", "float32", "double"};
     static const size_t bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
-    static const char *const color_names[] = {"uchar", "ushort", "float"};
+    static const char *const color_names[] = {"uchar", "ushort", "float", "char", "short"};
     for (size_t type = 0; type < 8; type++)
-        for (size_t color = 0; color < 3; color++)
+        for (size_t color = 0; color < 5; color++)
             for (int big = 0; big < 2; big++) {
                 sink s = {0};
                 char header[512];
@@ -205,8 +205,9 @@ static void types_and_orders(void **state)
                         }
                         if (order[k] >= 3) { /* a colour: value / 5 of the range */
                             const float level = (float)(order[k] - 3 + i) / 5;
-                            width = (const size_t[]){1, 2, 4}[color];
-                            bits = color == 2 ? 0 : (uint64_t)(order[k] - 3 + i) * (color == 0 ? 51 : 13107);
+                            width = (const size_t[]){1, 2, 4, 1, 2}[color];
+                            bits = (uint64_t)lround((double)level *
+                                                    (const int[]){255, 65535, 0, 127, 32767}[color]);
                             if (color == 2)
                                 memcpy(&bits, &level, 4);
                         } else if (order[k] >= 0 && type == 6) {
@@ -231,7 +232,8 @@ static void types_and_orders(void **state)
                 for (size_t i = 0; i < 3; i++)
                     for (size_t k = 0; k < 3; k++) {
                         assert_true(raw.position[3 * i + k] == (double)(10 * i + k));
-                        assert_true(fabsf(raw.color[3 * i + k] - (float)(i + k) / 5) < 1e-6f);
+                        assert_true(fabsf(raw.color[3 * i + k] - (float)(i + k) / 5) <
+                                    (color == 3 ? 0.5f / 127 : 2e-5f));
                     }
                 raw_free(&raw);
                 sink_free(&s);

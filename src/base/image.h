@@ -71,7 +71,7 @@ typedef struct image_names {
  */
 gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
 
-/** What EXIF says of the camera that took a photo. */
+/** What EXIF of a JPEG says of the camera that took a photo; that of a PNG is not read. */
 typedef struct image_lens {
     char camera[128]; /* make and model; empty when it says nothing */
     float focal;      /* millimetres; 0: unknown */

@@ -86,6 +86,13 @@ gbt_status child_start(child *c, const char *const *arguments, const char *log_p
                      arguments[0], arguments[0]);
 }
 
+/* To all that it started, too: it may be a script around the program. */
+static void signal_all(const child *c, int number)
+{
+    if (kill(-c->process, number) != 0)
+        kill(c->process, number);
+}
+
 static void pass_on_stop(child *c)
 {
     if (!stop_signal_seen() || c->process <= 0)
@@ -93,9 +100,9 @@ static void pass_on_stop(child *c)
     if (!c->was_told) {
         c->was_told = true;
         c->told_at = clock_wall();
-        kill(c->process, SIGINT);
+        signal_all(c, SIGINT);
     } else if (clock_wall() - c->told_at > patience) {
-        kill(c->process, SIGKILL);
+        signal_all(c, SIGKILL);
     }
 }
 
@@ -156,7 +163,7 @@ gbt_status child_end(child *c, const char *last, gbt_error *err)
 void child_kill(child *c)
 {
     if (c->process > 0) {
-        kill(c->process, SIGKILL);
+        signal_all(c, SIGKILL);
         wait_for(c);
     }
     if (c->output >= 0)

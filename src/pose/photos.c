@@ -77,7 +77,7 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
             status = file_look(path, &found, err);
         if (status == GBT_OK && found == FILE_FOLDER) {
             strcat(name, "/");
-            if (depth < DEPTH_MAX)
+            if (depth < DEPTH_MAX && !file_is_same(path, j->data)) /* its photos are links to these */
                 status = walk(j, root, name, depth + 1, err);
         } else if (status == GBT_OK && unposed_is_photo(name)) {
             status = take_photo(j, path, name, err);

@@ -125,6 +125,22 @@ says "after a kill too" 0 "^killed: 5 of 5 photos registered" pose "my photos" -
 mkdir placed && cp -R "my photos" placed/images && PATH=$tools "$program" pose placed -o placed >out 2>err && grep -q '^placed: 5 of 5' out
 report $? "in place" "$(cat out err)"
 
+# ---- data within the folder of the photos: links to them are not photos more
+mkdir holding && cp "my photos"/*.png holding/ && PATH=$tools "$program" pose holding -o holding/data >out 2>err && says "the data in the photos' own folder" 0 "^holding/data: 5 of 5" pose holding -o holding/data
+
+# ---- colmap as a script around the program: a signal reaches what it started
+mkdir wrapped && printf '#!/bin/sh\n"%s" "$@"\nexit $?\n' "$PWD/tools/colmap" >wrapped/colmap && chmod +x wrapped/colmap && rm -f tools/hanging tools/interrupted
+export FALSE_COLMAP=mapper-hangs
+PATH=$work/wrapped:$tools "$program" pose "my photos" -o wrapping >out 2>err </dev/null &
+gbtrace=$!
+while [ ! -e tools/hanging ] && kill -0 $gbtrace 2>/dev/null; do sleep 0.1; done
+kill -INT $gbtrace
+wait $gbtrace
+[ $? = 130 ] && [ -e tools/interrupted ]
+report $? "SIGINT reaches a program in a script" "$(cat err)"
+export FALSE_COLMAP=
+rm -f tools/hanging
+
 # ---- two cameras: progress goes over both, and a stage that is done again keeps the cameras of the database
 "$program" make-scene tabletop -o other --width 96 --height 72 --views 3 --samples 1 --points 50 --quiet >out 2>err
 mkdir both && cp five/images/*.png both/ && for file in other/images/*.png; do cp "$file" "both/other_${file##*/}"; done

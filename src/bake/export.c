@@ -256,10 +256,20 @@ static gbt_status check_place(const char *path, const char *folder, gbt_error *e
     return file_check_creatable(path, err);
 }
 
-static gbt_status check_places(const char *json, const char *const *outputs, size_t output_count,
-                               gbt_error *err)
+static gbt_status check_places(const char *input, const char *json, const char *const *outputs,
+                               size_t output_count, gbt_error *err)
 {
     const char *folder = NULL;
+    for (size_t i = 0; i < output_count; i++)
+        for (size_t k = 0; k <= i; k++) {
+            const char *other = k < i ? outputs[k] : json;
+            if (other != NULL && (strcmp(other, outputs[i]) == 0 || file_is_same(other, outputs[i])))
+                return base_fail(err, GBT_ERR_ARGUMENT,
+                                 "%s: would be written twice (each output must be another file)", other);
+        }
+    if (json != NULL && file_is_same(json, input))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
+                         json);
     for (size_t i = 0; i < output_count; i++)
         folder = export_folder_is(outputs[i]) ? outputs[i] : folder;
     if (folder != NULL)
@@ -307,7 +317,7 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
     }
     if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: a result folder is made once, of a run", input);
-    return check_places(def->json, outputs, output_count, err);
+    return check_places(input, def->json, outputs, output_count, err);
 }
 
 static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)

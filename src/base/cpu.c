@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/log.h"
+
 static const char *const names[CPU_ISA_COUNT] = {"plain", "neon", "avx2", "avx512"};
 static int chosen = -1;
 
@@ -43,9 +45,14 @@ cpu_isa cpu_best_isa(void)
     if (chosen < 0) {
         cpu_isa most = CPU_AVX512;
         const char *wanted = getenv("GBT_ISA");
-        for (int i = 0; wanted != NULL && i < CPU_ISA_COUNT; i++)
-            if (strcmp(wanted, names[i]) == 0)
+        bool known = wanted == NULL || wanted[0] == '\0';
+        for (int i = 0; !known && i < CPU_ISA_COUNT; i++)
+            if (strcmp(wanted, names[i]) == 0) {
                 most = (cpu_isa)i;
+                known = true;
+            }
+        if (!known)
+            log_warn("GBT_ISA=%.20s: no instruction set (wanted plain, neon, avx2 or avx512)", wanted);
         chosen = (int)within(most);
     }
     return (cpu_isa)chosen;
@@ -54,20 +61,3 @@ cpu_isa cpu_best_isa(void)
 void cpu_limit_isa(cpu_isa isa) { chosen = (int)within(isa); }
 
 const char *cpu_isa_name(cpu_isa isa) { return names[isa]; }
-
-void cpu_processor_name(char *out, size_t size)
-{
-    char line[256];
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    snprintf(out, size, "?");
-    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
-        const char *value = strchr(line, ':');
-        if (strncmp(line, "model name", 10) != 0 || value == NULL)
-            continue;
-        value += strspn(value, ": \t");
-        snprintf(out, size, "%.*s", (int)strcspn(value, "\r\n"), value);
-        break;
-    }
-    if (file != NULL)
-        fclose(file);
-}

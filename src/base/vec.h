@@ -9,6 +9,7 @@
 #include <stdbool.h>
 
 #define PI 3.14159265358979323846
+#define GOLDEN_ANGLE 2.399963229728653 /* radians */
 
 /** x to the precision of a float. Through memory: GCC 12 for x86-64 leaves both conversions out where it puts
    two neighbours into one register. */
@@ -35,6 +36,15 @@ static inline double dvec_length(const double a[3]) { return sqrt(dvec_dot(a, a)
 
 /** The length of (x, y): the same bits everywhere, which hypot does not have. */
 static inline double dvec_length2(double x, double y) { return sqrt(x * x + y * y); }
+
+/** Direction i of `count` that are spread evenly over the sphere: a Fibonacci spiral (Gonzalez 2010). */
+static inline void dvec_on_sphere(int i, int count, double out[3])
+{
+    const double z = 1 - (2 * i + 1.0) / count, across = sqrt(1 - z * z), turn = i * GOLDEN_ANGLE;
+    out[0] = across * cos(turn);
+    out[1] = across * sin(turn);
+    out[2] = z;
+}
 
 /** a scaled to length 1; a zero vector stays zero. */
 static inline void dvec_normalize(double a[3])
@@ -78,6 +88,23 @@ static inline void dmat_apply_transposed(const double m[9], const double a[3], d
     out[0] = x;
     out[1] = y;
     out[2] = z;
+}
+
+/** Unit quaternion of a rotation matrix. The largest of the four is found first, from the diagonal: nothing
+   is divided by something small. */
+static inline void dquat_of_matrix(const double m[9], double q[4])
+{
+    const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
+                              1 - m[0] - m[4] + m[8]}; /* 4 q_k^2 */
+    int big = 0;
+    for (int k = 1; k < 4; k++)
+        big = square[k] > square[big] ? k : big;
+    const double wx = m[7] - m[5], wy = m[2] - m[6], wz = m[3] - m[1], xy = m[3] + m[1], xz = m[2] + m[6],
+                 yz = m[7] + m[5]; /* 4 w x, ... */
+    const double rows[4][4] = {
+        {square[0], wx, wy, wz}, {wx, square[1], xy, xz}, {wy, xy, square[2], yz}, {wz, xz, yz, square[3]}};
+    for (int k = 0; k < 4; k++)
+        q[k] = 0.5 * rows[big][k] / sqrt(square[big]);
 }
 
 /** Rotation matrix of a unit quaternion, in double and in single precision. */

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/shell_word.h"
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/progress.h"
@@ -64,8 +65,10 @@ static int run(const operands *given)
     if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data ||
         snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)
         return command_misused("--output: the path is too long");
-    snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs", data, run_folder,
-             60 * minutes);
+    char data_word[sizeof data], run_word[sizeof run_folder];
+    snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs --seed %llu",
+             shell_word(data, data_word, sizeof data_word), shell_word(run_folder, run_word, sizeof run_word),
+             60 * minutes, (unsigned long long)train.seed);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = true;

@@ -39,8 +39,8 @@ static void check_environment(gbt_diagnosis *d)
     int known = 0, unknown = 0;
     *c = (gbt_check){.name = "environment"};
     for (char **variable = environ; *variable != NULL; variable++) {
-        if (strncmp(*variable, "GBTRACE_", 8) != 0)
-            continue;
+        if (strncmp(*variable, "GBTRACE_", 8) != 0 || strncmp(*variable, "GBTRACE_LIBRARY=", 16) == 0)
+            continue; /* the latter is of the Python package */
         const bool found = sets_option(*variable);
         known += found;
         unknown += !found;

@@ -2,6 +2,7 @@
 /* cli/cmd_pose.c -- gbtrace pose. */
 #include <stdio.h>
 
+#include "base/shell_word.h"
 #include "cli/options.h"
 #include "gbtrace/pose.h"
 
@@ -44,10 +45,11 @@ static const option *options(int *count)
 
 static int run(const operands *given)
 {
+    char word[8192];
     gbt_error err = {0};
     const gbt_status status = gbt_pose(given->value[0], &def, out, stdout, &err);
     if (status == GBT_OK)
-        printf("Train: gbtrace train %s%s%s -o RUN\n", shell_quote(out), out, shell_quote(out));
+        printf("Train: gbtrace train %s -o RUN\n", shell_word(out, word, sizeof word));
     return command_failed(status, &err);
 }
 

@@ -36,9 +36,6 @@ typedef struct command {
    that it names; returns the exit code that belongs to the status. */
 int command_failed(gbt_status status, const gbt_error *err);
 
-/** What stands before and behind a path in a command that is shown, so that a shell takes it for one word. */
-const char *shell_quote(const char *path);
-
 /** The same for the caller's own text: usage, exit code 2. */
 int command_misused(const char *format, ...) __attribute__((format(printf, 1, 2)));
 

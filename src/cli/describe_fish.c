@@ -13,6 +13,7 @@ static void write_rows(const command *self, const option_table *t, FILE *out)
 {
     for (int i = 0; i < t->count; i++) {
         const option *o = &t->rows[i];
+        char help[HELP_TEXT_SIZE];
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         fprintf(out, "complete -c gbtrace -n '__fish_seen_subcommand_from %s' -l %s", self->name, o->name);
@@ -46,7 +47,7 @@ static void write_rows(const command *self, const option_table *t, FILE *out)
             fputs(" -x -a '(__fish_complete_directories)'", out);
             break;
         }
-        write_note(out, o->help);
+        write_note(out, options_help_text(o, help, sizeof help));
     }
     if (self->words == NULL)
         return;

@@ -40,7 +40,7 @@ static void write_rows(const option_table *t, FILE *out)
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         const char *value_name = options_value_name(o);
-        char notes[512];
+        char notes[512], help[HELP_TEXT_SIZE];
         fputs(".TP\n\\fB", out);
         if (o->short_name != 0)
             fprintf(out, "\\-%c\\fR, \\fB", o->short_name);
@@ -53,7 +53,7 @@ static void write_rows(const option_table *t, FILE *out)
             fputs("\\fR", out);
         }
         fputc('\n', out);
-        write_text(out, o->help);
+        write_text(out, options_help_text(o, help, sizeof help));
         options_notes(o, true, notes, sizeof notes);
         write_text(out, notes);
         fputc('\n', out);
@@ -84,7 +84,8 @@ static const char tail[] =
     ".SH COMMON OPTIONS\n"
     "Every command has these.\n"
     ".TP\n\\fB\\-\\-config\\fR \\fIFILE\\fR\n"
-    "Read options from lines\n.I name\n=\n.IR value ;\n# starts a comment, flags are true or false.\n"
+    "Read options from lines\n.I name\n=\n.IR value ;\nlines that start with # are comments, flags are true "
+    "or false.\n"
     ".TP\n\\fB\\-\\-progress\\fR \\fIauto|json|none\\fR\n"
     "Progress on standard error: text, one JSON object per line, or warnings and errors only.\n"
     ".TP\n\\fB\\-\\-quiet\\fR\nThe same as\n.BR \"\\-\\-progress none\" .\n"
@@ -115,6 +116,7 @@ static const char tail[] =
     ".TP\n5\nout of memory, or over a limit\n"
     ".TP\n130\nstopped by SIGINT or SIGTERM, after saving; a second signal\n.I n\nends at once, with "
     "128+\\fIn\\fR\n"
+    ".TP\n141\nwho read the output has left\n"
     ".SH EXAMPLES\n"
     ".nf\n"
     "gbtrace train PHOTOS \\-o RUN \\-\\-budget 10m\n"

@@ -17,6 +17,7 @@ static void write_rows(const command *self, const option_table *t, FILE *out)
             self->alias != NULL ? self->alias : "");
     for (int i = 0; i < t->count; i++) {
         const option *o = &t->rows[i];
+        char help[HELP_TEXT_SIZE];
         if (o->kind == OPTION_ELSEWHERE)
             continue;
         fputs(" \\\n      ", out);
@@ -24,7 +25,7 @@ static void write_rows(const command *self, const option_table *t, FILE *out)
             fprintf(out, "'(-%c --%s)'{-%c,--%s}'[", o->short_name, o->name, o->short_name, o->name);
         else
             fprintf(out, "'--%s[", o->name);
-        write_note(out, o->help);
+        write_note(out, options_help_text(o, help, sizeof help));
         fputc(']', out);
         const value_kind kind = describe_value(o);
         if (kind != VALUE_NONE) {

@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "base/shell_word.h"
 #include "cli/command.h"
 #include "cli/progress.h"
 #include "gbtrace/compress.h"
@@ -25,7 +26,7 @@ gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
 
 void finish_run_say(const char *run)
 {
+    char word[8192];
     if (progress_for_people())
-        printf("Report: %s/report.html\nViewer: gbtrace view %s%s%s\n", run, shell_quote(run), run,
-               shell_quote(run));
+        printf("Report: %s/report.html\nViewer: gbtrace view %s\n", run, shell_word(run, word, sizeof word));
 }

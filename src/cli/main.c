@@ -24,8 +24,9 @@ static int print_help(void)
         printf("  %-12s%s\n", command_list[i]->name, command_list[i]->summary);
     puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the "
          "version.\n"
-         "Exit codes: 0 done, 2 usage, 3 bad input, 4 input or output failed, 5 out of memory or over a "
-         "limit, 130 interrupted.");
+         "Exit codes: 0 done, 1 a check failed, 2 usage, 3 bad input, 4 input or output failed, 5 out of "
+         "memory "
+         "or over a limit, 130 interrupted, 141 who read the output has left.");
     return 0;
 }
 

@@ -199,16 +199,28 @@ static void print_wrapped(const char *text, int at)
     putchar('\n');
 }
 
+const char *options_help_text(const option *o, char *out, size_t size)
+{
+    out[0] = '\0';
+    for (const char *word = o->of; word != NULL && *word != '\0';) {
+        const size_t length = strcspn(word, " ");
+        add(out, size, "%s%.*s", out[0] != '\0' ? ", " : "", (int)length, word);
+        word += length + strspn(word + length, " ");
+    }
+    add(out, size, "%s%s", o->of != NULL ? ": " : "", o->help);
+    return out;
+}
+
 static void print_row(const option *o, bool all)
 {
-    char left[256], text[1024], notes[512], short_text[8] = "    ";
+    char left[256], help[HELP_TEXT_SIZE], text[2048], notes[512], short_text[8] = "    ";
     const char *value_name = options_value_name(o);
     if (o->short_name != 0)
         snprintf(short_text, sizeof short_text, "-%c, ", o->short_name);
     const int used = snprintf(left, sizeof left, "  %s--%s%s%s", short_text, o->name,
                               value_name[0] != '\0' ? " " : "", value_name);
     options_notes(o, all, notes, sizeof notes);
-    snprintf(text, sizeof text, "%s%s", o->help, notes);
+    snprintf(text, sizeof text, "%s%s", options_help_text(o, help, sizeof help), notes);
     printf("%-*s", used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT, left);
     print_wrapped(text, used > HELP_INDENT - 2 ? used + 2 : HELP_INDENT);
 }

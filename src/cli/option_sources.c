@@ -121,7 +121,7 @@ int options_read_config(const char *path, const option *options, int option_coun
 
 bool options_in_environment(const option *o)
 {
-    return may_stand_here(o) && o->kind != OPTION_OPERAND && strcmp(o->name, "help") != 0;
+    return may_stand_here(o) && o->kind != OPTION_OPERAND && strncmp(o->name, "help", 4) != 0;
 }
 
 void options_variable(const char *command_name, const char *option_name, char *out, size_t size)

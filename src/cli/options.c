@@ -180,6 +180,9 @@ static int walk(const option_table *t, bool common, int argc, char **argv, bool 
         } else if (a.index >= 0) {
             if (given[a.index])
                 return command_misused("%s: given twice", a.label);
+            for (int k = 0; k < t->count; k++)
+                if (given[k] && o->value != NULL && t->rows[k].value == o->value)
+                    return command_misused("%s: not with --%s", a.label, t->rows[k].name);
             given[a.index] = true;
             const int applied = apply(&a, o, argc, argv, &i);
             if (applied != GO_ON)
@@ -222,6 +225,30 @@ static int check_words(const command *self, const char *typed)
     return command_misused("%s: \"%.60s\" (wanted %.400s%s%s%s)", self->name, typed, list,
                            nearest != NULL ? "; did you mean " : "", nearest != NULL ? nearest : "",
                            nearest != NULL ? "?" : "");
+}
+
+static bool has_word(const char *words, const char *word)
+{
+    const size_t length = strlen(word);
+    for (; *words != '\0'; words += strspn(words, " ")) {
+        const size_t end = strcspn(words, " ");
+        if (end == length && strncmp(words, word, length) == 0)
+            return true;
+        words += end;
+    }
+    return false;
+}
+
+/* What was typed belongs to the first operand. Files and variables may say more, for other uses. */
+static int check_belongs(const command *self, const option_table *t, const bool *typed, const operands *out)
+{
+    for (int i = 0; i < t->own && out->count > 0; i++) {
+        const option *o = &t->rows[i];
+        if (typed[i] && o->of != NULL && !has_word(o->of, out->value[0]))
+            return command_misused("--%s: not of %s %.60s (of %s)", o->name, self->name, out->value[0],
+                                   o->of);
+    }
+    return GO_ON;
 }
 
 static int check_complete(const command *self, const option_table *t, const bool *given, const operands *out)
@@ -289,6 +316,7 @@ int options_parse(const command *self, int argc, char **argv, operands *out)
     else if (configured_operand != NULL && out->count < (self->min_operands > 0 ? self->min_operands : 1))
         put_first(out, configured_operand);
     for (int i = 0; i < t->count; i++)
-        given[i] = given[i] || before[i];
-    return check_complete(self, t, given, out);
+        before[i] = before[i] || given[i];
+    code = check_complete(self, t, before, out);
+    return code == GO_ON ? check_belongs(self, t, given, out) : code;
 }

@@ -43,6 +43,8 @@ typedef struct option {
     const char *aliases; /* more names with blanks between, as other programs call it; one letter goes with
                             one dash */
     const char *fixed;   /* OPTION_STRING, OPTION_CHOICE: takes no value, and sets this one */
+    const char *of;      /* what the first operand is where the row belongs, words with blanks between; NULL:
+                            anything. Else it is refused on the command line */
     bool required;
     bool rare; /* in --help-all alone */
 } option;
@@ -99,7 +101,13 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err);
         .help = "the same as RUN", .aliases = (more), .rare = true                                           \
     }
 
-enum { OPTIONS_MAX = 80, OPTIONS_MAX_OPERANDS = 64, OPTIONS_COMMON = 5, OPTIONS_WANTED_SIZE = 256 };
+enum {
+    OPTIONS_MAX = 80,
+    OPTIONS_MAX_OPERANDS = 64,
+    OPTIONS_COMMON = 5,
+    OPTIONS_WANTED_SIZE = 256,
+    HELP_TEXT_SIZE = 1024
+};
 
 typedef struct operands {
     int count;
@@ -121,9 +129,9 @@ void options_table(const command *self, option_table *out);
  *
  * Takes `--name VALUE`, `--name=VALUE`, `-x VALUE`; `--` ends the options. Five options belong to every
  * command: `--help` and `--help-all` print the help to stdout, `--progress` and `--quiet` say how to tell
- * what is going on, `--config FILE` reads `name = value` lines (# starts a comment; flags are true or false).
- * The environment wins over the file (GBTRACE_NAME, and over that GBTRACE_COMMAND_NAME), the command line
- * over both. Strings stay valid until the program ends.
+ * what is going on, `--config FILE` reads `name = value` lines (lines with # at their start are comments;
+ * flags are true or false). The environment wins over the file (GBTRACE_NAME, and over that
+ * GBTRACE_COMMAND_NAME), the command line over both. Strings stay valid until the program ends.
  *
  * @return -1: go on; else the exit code to end with: 0 after --help, 2 for a bad command line or environment
  *         (3 and 4 for a bad --config file), after one line on stderr
@@ -163,6 +171,9 @@ bool options_takes_value(const option *o);
 
 /** What stands for its value in a list: choices, a name, or "". */
 const char *options_value_name(const option *o);
+
+/** The help text; before it the words that the row belongs to: "speed, rate: ...". Returns `out`. */
+const char *options_help_text(const option *o, char *out, size_t size);
 
 /** "(default 2)", "(needed)" or "", and `names`: the other names. */
 void options_notes(const option *o, bool names, char *out, size_t size);

@@ -31,8 +31,6 @@ int command_failed(gbt_status status, const gbt_error *err)
     return gbt_status_exit_code(status);
 }
 
-const char *shell_quote(const char *path) { return strpbrk(path, " &;()") != NULL ? "'" : ""; }
-
 int command_misused(const char *format, ...)
 {
     char text[1024];

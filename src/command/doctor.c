@@ -68,7 +68,10 @@ static void check_processor(gbt_diagnosis *d, const machine *m)
     const char *wanted = getenv("GBT_ISA");
     snprintf(c->found, sizeof c->found, "%s; kernels for %s",
              m->processor[0] != '\0' ? m->processor : "unknown", cpu_isa_name(isa));
-    if (wanted != NULL && wanted[0] != '\0')
+    bool held = false;
+    for (int i = (int)isa + 1; i < CPU_ISA_COUNT; i++)
+        held = held || cpu_has_isa((cpu_isa)i);
+    if (held && wanted != NULL)
         advise(c, GBT_CHECK_WARN, "GBT_ISA=%.20s holds the kernels back: unset it", wanted);
     else if (isa == CPU_PLAIN)
         advise(c, GBT_CHECK_WARN,
@@ -85,7 +88,7 @@ static void check_threads(gbt_diagnosis *d, const machine *m)
         used += (size_t)snprintf(c->found + used, sizeof c->found - used, "; %d are allowed to this process",
                                  m->processors_allowed);
     if (isfinite(m->processors_quota))
-        snprintf(c->found + used, sizeof c->found - used, "; the control group gives the time of %.2g",
+        snprintf(c->found + used, sizeof c->found - used, "; the control group gives the time of %.4g",
                  m->processors_quota);
     const int best = machine_threads(m);
     if (threads > best)

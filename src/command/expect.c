@@ -35,8 +35,6 @@ static double core_seconds_of_step(const gbt_camera *camera, const train_rules *
 
 expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa)
 {
-    if (downscale <= 0)
-        downscale = photos_usual_downscale(s, true);
     const gbt_train_def def = gbt_train_def_default();
     const train_rules rules = train_rules_of(&def);
     double test_pixels = 0, train_count = 0, seconds = 0;

@@ -19,7 +19,7 @@ typedef struct expectation {
 } expectation;
 
 /**
- * Of a run with the default settings and photos divided by `downscale`; 0: as training divides them. Good
+ * Of a run with the default settings and photos divided by `downscale`, above 0. Good
  * within a quarter on scenes and processors like those it was measured on.
  */
 expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa);

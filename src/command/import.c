@@ -67,6 +67,18 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     return GBT_OK;
 }
 
+/* Before any work. */
+static gbt_status check_places(const char *run, const gbt_import_def *def, gbt_error *err)
+{
+    char path[RESULT_PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, run, "config", err));
+    if (file_exists(path))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: holds a trained run (wanted another folder)", run);
+    return def->data == NULL || file_exists(def->data)
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_IO, "%.1000s: the data set is not there", def->data);
+}
+
 static gbt_status write_run(const model *m, const char *run, gbt_error *err)
 {
     char path[RESULT_PATH_SIZE];
@@ -80,6 +92,7 @@ gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *
 {
     GBT_TRY(def_check(def->cookie_, "gbt_import_def_default", err));
     GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
+    GBT_TRY(check_places(run, def, err));
     result_folder *from = mem_calloc(1, sizeof *from, "import", err);
     model *m = mem_calloc(1, sizeof *m, "import", err);
     size_t dropped = 0;

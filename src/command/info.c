@@ -14,12 +14,13 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "cells/draw.h"
+#include "command/expect.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "data/photo_check.h"
 #include "data/scene.h"
-#include "command/expect.h"
 #include "io/model_file.h"
+#include "train/photos.h"
 
 /* ---- data sets ---- */
 
@@ -151,8 +152,12 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
         facts.rolling_views += !camera_is_still(&s.views[i].camera);
         facts.test_views += s.views[i].is_test;
     }
-    facts.expect = expect_training(&s, 0, parallel_threads(), cpu_best_isa());
-    gbt_status status = find_box(s.points.position, s.points.count, s.origin, facts.low, facts.high, err);
+    double downscale;
+    gbt_status status = photos_usual_downscale(&s, true, &downscale, err);
+    if (status == GBT_OK)
+        facts.expect = expect_training(&s, downscale, parallel_threads(), cpu_best_isa());
+    if (status == GBT_OK)
+        status = find_box(s.points.position, s.points.count, s.origin, facts.low, facts.high, err);
     if (status == GBT_OK && json) {
         json_t *value = dataset_to_json(path, &facts);
         status = json_print(value, out, err);

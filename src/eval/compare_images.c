@@ -26,8 +26,9 @@ static gbt_status read_colors(const char *path, image *out, gbt_error *err)
 /* Of two quantized images. */
 static gbt_status compare(const image *a, const image *b, gbt_comparison *out, gbt_error *err)
 {
-    *out = (gbt_comparison){
-        a->width, a->height, metric_psnr(a, b), metric_ssim(a, b), metric_ssim_interior(a, b), 0};
+    *out = (gbt_comparison){.width = a->width, .height = a->height, .psnr = metric_psnr(a, b)};
+    GBT_TRY(metric_ssim(a, b, &out->ssim, err));
+    GBT_TRY(metric_ssim_interior(a, b, &out->ssim_interior, err));
     return metric_flip(a, b, &out->flip, NULL, err);
 }
 

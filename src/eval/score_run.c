@@ -36,15 +36,15 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
         status = image_alloc(&error_map, render->width, render->height, 1, err);
     if (status == GBT_OK)
         status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
+    const int first_column = r->def.exposure ? render->width / 2 : 0; /* as image_score_photo() scores */
     if (status == GBT_OK)
-        status = image_psnr_fitted(render, &photo, valid, &score->psnr_fitted, err);
+        status = image_psnr_fitted(render, &photo, valid, first_column, &score->psnr_fitted, err);
     score->psnr = scores.psnr;
     score->ssim = scores.ssim;
     score->flip = scores.flip;
     score->masked = valid != NULL;
-    if (status == GBT_OK && net != NULL) /* of the half that is scored (image_score_photo()) */
-        status = lpips_compare(net, render, &photo, valid, r->def.exposure ? render->width / 2 : 0,
-                               &score->lpips, err);
+    if (status == GBT_OK && net != NULL)
+        status = lpips_compare(net, render, &photo, valid, first_column, &score->lpips, err);
     if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};

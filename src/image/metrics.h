@@ -33,14 +33,15 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
  * the border is 0 in both.
  *
  * @param a, b  equal width, height (from 1 x 1) and channels (any number)
- * @return (-1, 1]; NaN when the sizes differ, a value is not finite, or memory is short
+ * @param ssim [out] (-1, 1]; NaN when the sizes differ, or a value is not finite
+ * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: any; the same bits for every thread count and instruction set.
  */
-double metric_ssim(const image *a, const image *b);
+gbt_status metric_ssim(const image *a, const image *b, double *ssim, gbt_error *err);
 
 /** The same mean over the pixels whose window lies wholly inside, which is free of any choice about borders;
     NaN below 11 x 11 pixels. */
-double metric_ssim_interior(const image *a, const image *b);
+gbt_status metric_ssim_interior(const image *a, const image *b, double *ssim, gbt_error *err);
 
 /**
  * Mean LDR-FLIP (Andersson 2020) at 67.02 pixels per degree (0.7 m from a screen of 3840 pixels in 0.7
@@ -88,11 +89,12 @@ gbt_status image_score_photo(image *render, image *photo, const unsigned char *v
  * PSNR after the 3 x 4 colour matrix that brings the render nearest to the photo, by least squares
  * (affine_fit()): what would be left if the photo's exposure were known.
  *
+ * @param first_column [in] the columns from here on are fitted and scored
  * @param psnr [out] dB; NaN without a pixel that counts
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  */
 gbt_status image_psnr_fitted(const image *render, const image *photo, const unsigned char *valid,
-                             double *psnr, gbt_error *err);
+                             int first_column, double *psnr, gbt_error *err);
 
 /** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS
     and its successors do. */

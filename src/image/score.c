@@ -72,7 +72,7 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
     if (valid != NULL)
         return score_masked(a, photo, valid, flip_map, out, err);
     out->psnr = metric_psnr(a, photo);
-    out->ssim = metric_ssim(a, photo);
+    GBT_TRY(metric_ssim(a, photo, &out->ssim, err));
     return metric_flip(a, photo, &out->flip, flip_map, err);
 }
 
@@ -97,15 +97,23 @@ gbt_status image_score_photo(image *render, image *photo, const unsigned char *v
 }
 
 gbt_status image_psnr_fitted(const image *render, const image *photo, const unsigned char *valid,
-                             double *psnr, gbt_error *err)
+                             int first_column, double *psnr, gbt_error *err)
 {
     image fitted = {0};
     float matrix[AFFINE_NUMBERS];
-    GBT_TRY(image_alloc(&fitted, render->width, render->height, 3, err));
-    affine_fit(render, photo, valid, 0, render->width, matrix);
-    affine_apply(matrix, render, &fitted);
-    image_quantize(&fitted);
-    *psnr = metric_psnr_valid(&fitted, photo, valid);
+    const size_t width = (size_t)render->width, pixels = width * (size_t)render->height;
+    unsigned char *counted = mem_alloc(pixels, 1, "pixels that count", err);
+    gbt_status status =
+        counted == NULL ? GBT_ERR_NO_MEMORY : image_alloc(&fitted, render->width, render->height, 3, err);
+    if (status == GBT_OK) {
+        for (size_t i = 0; i < pixels; i++)
+            counted[i] = i % width >= (size_t)first_column && (valid == NULL || valid[i] != 0);
+        affine_fit(render, photo, counted, first_column, render->width, matrix);
+        affine_apply(matrix, render, &fitted);
+        image_quantize(&fitted);
+        *psnr = metric_psnr_valid(&fitted, photo, counted);
+    }
     image_free(&fitted);
-    return GBT_OK;
+    mem_free(counted);
+    return status;
 }

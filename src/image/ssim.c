@@ -43,29 +43,36 @@ static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Mean over the pixels that are at least `border` from all four sides. */
-static double mean_ssim(const image *a, const image *b, size_t border)
+static gbt_status mean_ssim(const image *a, const image *b, size_t border, double *ssim, gbt_error *err)
 {
+    *ssim = (double)NAN;
     if (a->width != b->width || a->height != b->height || a->channels != b->channels ||
         2 * border >= (size_t)a->width || 2 * border >= (size_t)a->height)
-        return (double)NAN;
+        return GBT_OK;
     const size_t count = (size_t)a->width * (size_t)a->channels, height = (size_t)a->height;
     const size_t padded = count + 2 * WINDOW_RADIUS * (size_t)a->channels;
     const size_t row_doubles = parallel_block_count(height, ROWS_PER_BLOCK) * (WINDOW_MOMENTS + 1) * padded;
-    double ssim = (double)NAN;
-    double *rows = mem_alloc(row_doubles + height, sizeof *rows, "SSIM rows", NULL);
-    float *zeros = mem_calloc(count, sizeof *zeros, "SSIM rows", NULL);
-    if (rows != NULL && zeros != NULL) {
+    double *rows = mem_alloc(row_doubles + height, sizeof *rows, "SSIM rows", err);
+    float *zeros = rows != NULL ? mem_calloc(count, sizeof *zeros, "SSIM rows", err) : NULL;
+    if (zeros != NULL) {
         ssim_job job = {window_kernels_best(),       a, b, zeros, rows, rows + row_doubles, count, padded,
                         border * (size_t)a->channels};
         parallel_blocks(height, ROWS_PER_BLOCK, ssim_rows, &job);
-        ssim = window_sum(job.sums + border, height - 2 * border) /
-               ((double)(count - 2 * job.skip) * (double)(height - 2 * border));
+        *ssim = window_sum(job.sums + border, height - 2 * border) /
+                ((double)(count - 2 * job.skip) * (double)(height - 2 * border));
     }
+    const gbt_status status = zeros != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     mem_free(rows);
     mem_free(zeros);
-    return ssim;
+    return status;
 }
 
-double metric_ssim(const image *a, const image *b) { return mean_ssim(a, b, 0); }
+gbt_status metric_ssim(const image *a, const image *b, double *ssim, gbt_error *err)
+{
+    return mean_ssim(a, b, 0, ssim, err);
+}
 
-double metric_ssim_interior(const image *a, const image *b) { return mean_ssim(a, b, WINDOW_RADIUS); }
+gbt_status metric_ssim_interior(const image *a, const image *b, double *ssim, gbt_error *err)
+{
+    return mean_ssim(a, b, WINDOW_RADIUS, ssim, err);
+}

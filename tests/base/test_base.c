@@ -20,6 +20,7 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/rng.h"
+#include "base/shell_word.h"
 #include "base/vec.h"
 #include "test_support.h"
 
@@ -662,6 +663,12 @@ static void rotations(void **state)
         for (int k = 0; k < 3; k++)
             assert_near(third[k], m[6 + k], 1e-15);
         float mf[9];
+        double back[4];
+        dquat_of_matrix(m, back);
+        for (int k = 0; k < 4; k++) /* q and -q turn alike */
+            assert_near(back[k] *
+                            (back[0] * q[0] + back[1] * q[1] + back[2] * q[2] + back[3] * q[3] < 0 ? -1 : 1),
+                        q[k], 1e-15);
         quat_to_matrix((const float[4]){(float)q[0], (float)q[1], (float)q[2], (float)q[3]}, mf);
         for (int k = 0; k < 9; k++)
             assert_near((double)mf[k], m[k], 1e-6);
@@ -671,9 +678,42 @@ static void rotations(void **state)
     assert_near(dvec_length(zero), 0, 0);
 }
 
+/* As a shell reads them back: what it prints of each is the text itself. */
+static void a_shell_takes_a_text_for_one_word(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {"run",
+                                        "a/b-1_2.x=3",
+                                        "my photos",
+                                        "it's mine",
+                                        "$HOME `id` \"x\" *",
+                                        "a#b",
+                                        "<in >out | &;()",
+                                        "'",
+                                        "",
+                                        "~",
+                                        "\xc3\xa9",
+                                        "a\nb",
+                                        "!x",
+                                        "\\"};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        char word[256], command[300], got[256];
+        snprintf(command, sizeof command, "printf '%%s' %s", shell_word(texts[i], word, sizeof word));
+        FILE *shell = popen(command, "r");
+        assert_non_null(shell);
+        got[fread(got, 1, sizeof got - 1, shell)] = '\0';
+        assert_int_equal(pclose(shell), 0);
+        assert_string_equal(got, texts[i]);
+    }
+    char small[4];
+    assert_string_equal(shell_word("run", small, sizeof small), "run");
+    assert_string_equal(shell_word("a run", small, sizeof small), "'a ");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_shell_takes_a_text_for_one_word),
         cmocka_unit_test(a_rotation_has_nine_numbers),
         cmocka_unit_test(first_cause_wins),
         cmocka_unit_test(exit_codes),

@@ -342,6 +342,7 @@ report $? "report makes the same page again" "$(cat err)"
     grep -q '^tiny/report.html: 0 held-out views$' err
 report $? "report takes the charts of studies" "$(cat err)"
 misuse 4 "no-charts: no such file or folder (wanted what gbtrace study wrote)" report tiny no-charts
+misuse 2 "tiny/config: no chart (wanted .svg, or a folder of them)" report tiny tiny/config
 misuse 4 "nothing/metrics.json: cannot open: No such file or directory" report nothing
 
 # ---- Gaussians: time, speed against accuracy
@@ -385,6 +386,11 @@ misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, tim
 misuse 2 'bench: "tarce" (wanted trace or query; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
 misuse 2 "--points: bad value (wanted a whole number from 10000 to 10000000, got 10)" bench query --points 10
+misuse 2 "--json: not of bench query (of trace)" bench query --points 10000 --json figures.json
+misuse 2 "--output: not of bench trace (of query)" bench trace --model gaussians.ply -o figures
+misuse 2 "--seeds: not of study speed (of paper time anchors)" study speed gaussians.ply -o study --seeds 3
+misuse 2 "--count: not of query within (of nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
+misuse 2 "--skip-test: not with --skip-train" render tiny -o o --skip-train --skip-test
 bench="bench query --points 10000 --queries 2000 --check"
 prints "bench query agrees with brute force" '^| 8 nearest | 2000 | 16000 | 0 |$' $bench -o query
 prints "for rays too" '^| crossed | 2000 | [1-9][0-9]* | 0 |$' $bench
@@ -535,6 +541,9 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "--refine: 3 of plain.ply (wanted a trained model)" export plain.ply o.ply --refine 3
     misuse 2 "--no-backdrop: not for plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
     misuse 2 "--data: not for plain.ply (wanted a trained model)" export plain.ply o.ply --data made
+    misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply o.ply
+    misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply --json o.ply
+    misuse 2 "plain.ply: would be overwritten (--json must be another file)" export plain.ply o.ply --json plain.ply
     misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --camera x.json
     misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --path x.json
     misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000
@@ -572,11 +581,15 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "result: a result folder is made once, of a run" export result other/
     misuse 4 "nothing: cannot open: No such file or directory" import nothing -o imported
     misuse 4 "empty: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)" import empty -o imported
+    misuse 2 "run: holds a trained run (wanted another folder)" import empty -o run
+    misuse 4 "nowhere: the data set is not there" import empty -o imported --data nowhere
     misuse 2 "scene.obj: which format? (wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz)" export run scene.obj
     misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
     misuse 4 "nothing: cannot open: No such file or directory" eval run --lpips nothing
     misuse 4 "nothing: cannot open: No such file or directory" compare pictures-same/*.png pictures-same/*.png --lpips nothing
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
+    misuse 2 "small.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json small.gbt
+    misuse 2 "run/model.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json run/model.gbt
     misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
 else
     report 1 "a run to render" "$(cat err)"

@@ -349,13 +349,13 @@ static void other_names(void **state)
         -1);
     assert_true(found.count == 1 && strcmp(found.value[0], "data") == 0);
     assert_true(strcmp(s.folder, "run") == 0 && s.depth == 4 && s.split == 1 && !s.grow);
-    assert_int_equal(
-        parse_spelled(&s, 5, (char *[]){"second", "--data=first", "--skip-test", "--split", "all"}, &found),
-        -1);
+    assert_int_equal(parse_spelled(&s, 4, (char *[]){"second", "--data=first", "--split", "all"}, &found),
+                     -1);
     assert_true(found.count == 2 && strcmp(found.value[0], "first") == 0 &&
                 strcmp(found.value[1], "second") == 0);
     assert_int_equal(s.split, 2);
-    static char *const wrong[][4] = {{"x", "-w"},
+    static char *const wrong[][4] = {{"x", "--skip-test", "--split", "all"},
+                                     {"x", "-w"},
                                      {"x", "--gpu=0"},
                                      {"x", "--r", "4"},
                                      {"x", "--skip-test=all"},

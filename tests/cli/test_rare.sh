@@ -33,6 +33,13 @@ holds "times that fall" 2 '^error: --eval-at: "1s" (wanted up to [0-9]* rising t
 holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --eval-at soon
 holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"
 holds "more anchors at the start than are wanted" 0 '^warning: max_anchors: the sparse points make [0-9]* anchors, and so none is added to them (wanted at most 5)$' train made -o many --iterations 3 --max-anchors 5
+holds "settings that compat does not use" 0 '^warning: splats_until, threshold_factor: not used with compat$' train made -o reference --iterations 3 --compat --splats-until 0.7 --threshold-factor 3
+holds "nothing is said of those that it uses" 0 '^[^w]' train made -o reference --iterations 3 --compat --overwrite && ! grep -q 'not used' err
+report $? "no warning without reason" "$(cat err)"
+"$program" train made -o paused --iterations 60 --stop-at-step 40 --quiet >out 2>err
+echo 30,1.25,0.5,32,24,0.2,0.1,0.5,15,20.5,273,460 >>paused/log.csv # as --eval-at leaves it
+"$program" train -o paused --resume --quiet >>out 2>>err && tr -d ' \n' <paused/train.json | grep -q '"held_out":.{"seconds":1.25,"step":30,"psnr":20.5}'
+report $? "a resumed run keeps its scores on the way" "$(cat err out)"
 mkdir wide && cp -r made/* wide && holds "a sky that is learned" 0 '^2 held-out views: ' train wide -o wide/run --iterations 5 --background sky
 holds "and what it was trained with" 0 '^  config    background = sky$' info wide/run
 printf '0001.png\n0005.png\n' >names.txt && "$program" train made -o listed --iterations 3 --eval-split list=names.txt --quiet >out 2>err && rm names.txt &&
@@ -49,6 +56,10 @@ report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat 
 "$program" train made -o splats --renderer raster --iterations 3 --quiet >out 2>err && ! "$program" render splats -o none --outputs depth >>out 2>>err &&
     "$program" render splats -o splats-exact --renderer reference --outputs depth >>out 2>>err && [ -s splats-exact/0000.depth.exr ]
 report $? "the reference, and depth beside it, of a model of splats" "$(cat err out; ls splats-exact)"
+printf '{"cameras": [{"origin": [0, 0, -4], "target": [0, 0, 0]}, {"origin": [1, 0, -4], "target": [0, 0, 0]}], "rays": "none.exr"}' >rays.json
+holds "rays beside the cameras of a path" 3 '^error: rays.json: cameras.0..rays: not in a path (wanted a camera)$' render run --path rays.json -o none
+holds "a limit that one picture passes: it is drawn" 5 '^error: memory: 20 MB is too little: this took [0-9]* (all is done' render run -o drawn --memory 20M && [ -s drawn/0000.png ]
+report $? "and is there" "$(ls drawn)"
 "$program" render run -o path --path orbit --frames 2 --size 20x10 >out 2>err && [ "$(ls path | wc -l)" = 2 ]
 report $? "an orbit of another size" "$(cat err)"
 cat >path.json <<'END'
@@ -87,6 +98,11 @@ echo 0000.png >held # it is nearer to things than all that are trained on
 report $? "render draws a held-out photo with its near distance, as it was scored" "$(cat out)"
 "$program" export run fresh/n.ply fresh/ --refine 0 >out 2>err && [ -s fresh/n.ply ] && [ -s fresh/cfg_args ] && ! "$program" export run other/sub/n.ply other/ --refine 0 >>out 2>>err && [ ! -e other ]
 report $? "a file in a result folder that is named first" "$(cat err out)"
+"$program" train made -o whole-set --iterations 3 --eval-split none --quiet >out 2>err && "$program" export whole-set set/ --refine 0 >>out 2>>err && grep -q 'eval=False' set/cfg_args && grep -q 'eval=True' result/cfg_args
+report $? "a result folder says whether photos were held out" "$(cat err out)"
+mkdir -p twice/point_cloud/iteration_1 && cp plain.ply twice/point_cloud/iteration_1/point_cloud.ply && camera='"width": 16, "height": 12, "fx": 15, "fy": 15, "rotation": [[1,0,0],[0,1,0],[0,0,1]], "img_name": "r_0"' &&
+    printf "[{%s, \"position\": [0,0,-4]}, {%s, \"position\": [0,1,-4]}]" "$camera" "$camera" >twice/cameras.json && "$program" render twice -o twice-drawn --split all >out 2>err && [ "$(ls twice-drawn | tr '\n' ' ')" = "r_0-00001.png r_0.png " ]
+report $? "two cameras of one name" "$(cat err out; ls twice-drawn)"
 holds "info of plain Gaussians, as JSON" 0 '^  "kind": "gaussians",$' info plain.ply --json
 
 prim='def ParticleField3DGaussianSplat "one" { point3f[] positions = [(1, 2, 3)] quatf[] orientations = [(1, 0, 0, 0)] float[] opacities = [0.5] float3[] scales = [(1, 1, 1)]'
@@ -103,6 +119,11 @@ usd "a prim in one that says so behind it" 1 "def Xform \"all\" { def Scope \"so
 usd "a prim in one that is not moved, beside some that are" 0 "def Xform \"all\" { def Xform \"a\" { $moved } $prim } def Xform \"b\" { $moved } } def Xform \"c\" { $moved }"
 
 # ---- counts and places
+GBT_ISA=sse "$program" info made >out 2>err && grep -q '^warning: GBT_ISA=sse: no instruction set (wanted plain, neon, avx2 or avx512)$' err
+report $? "an instruction set that is none" "$(cat err)"
+GBTRACE_LIBRARY=/nothing "$program" doctor >out 2>&1
+! grep -q 'no command has the option' out
+report $? "the doctor knows the variable of the Python package" "$(cat out)"
 "$program" init made -o anchors.ply --json counts.json >out 2>err && [ "$(grep -c '"color_rms": 0\.1' counts.json)" -ge 3 ]
 report $? "init tells how well anchors stand for points" "$(cat err out; cat counts.json)"
 cp -r run small && "$program" compress run -o small.gbt >out 2>err && "$program" compress small -o limited.gbt --memory 400M >>out 2>>err && cmp small.gbt limited.gbt >>out

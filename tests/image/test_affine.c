@@ -247,7 +247,7 @@ static void fitted_psnr_leaves_exposure_out(void **state)
     image_quantize(&render);
     image_quantize(&photo);
     double psnr;
-    assert_ok(image_psnr_fitted(&render, &photo, NULL, &psnr, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, NULL, 0, &psnr, NULL));
     print_message("PSNR %.2f dB, colours fitted %.2f dB\n", metric_psnr(&render, &photo), psnr);
     assert_true(metric_psnr(&render, &photo) < 20 && psnr > 53);
     for (int i = 0; i < 32 * 24; i++) {
@@ -256,11 +256,20 @@ static void fitted_psnr_leaves_exposure_out(void **state)
             photo.pixels[3 * i] = 1 - photo.pixels[3 * i];
     }
     double masked;
-    assert_ok(image_psnr_fitted(&render, &photo, NULL, &psnr, NULL));
-    assert_ok(image_psnr_fitted(&render, &photo, valid, &masked, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, NULL, 0, &psnr, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, valid, 0, &masked, NULL));
     assert_true(psnr < 30 && masked > 53);
+    for (int i = 0; i < 32 * 24; i++) { /* what is left of the first column is neither fitted nor scored */
+        valid[i] = i % 32 >= 16;
+        for (int c = 0; c < 3 && !valid[i]; c++)
+            photo.pixels[3 * i + c] = 0.5f;
+    }
+    double right;
+    assert_ok(image_psnr_fitted(&render, &photo, valid, 0, &masked, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, NULL, 16, &right, NULL));
+    assert_true(fabs(right - masked) < 1e-9);
     memset(valid, 0, sizeof valid);
-    assert_ok(image_psnr_fitted(&render, &photo, valid, &psnr, NULL));
+    assert_ok(image_psnr_fitted(&render, &photo, valid, 0, &psnr, NULL));
     assert_true(isnan(psnr));
     image_free(&render);
     image_free(&photo);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/vec.h"
 
 /* On a sphere of radius 1 the Gaussians are sqrt(4 pi / BACKDROP_COUNT) = 0.112 apart. At this standard
    deviation they overlap so far that nothing shines through between them. */
@@ -47,12 +48,10 @@ gbt_status backdrop_add(gaussian_cloud *cloud, const gbt_camera *cameras, size_t
     memcpy(all.quat, cloud->quat, 4 * n * sizeof *all.quat);
     memcpy(all.opacity, cloud->opacity, n * sizeof *all.opacity);
     memcpy(all.sh, cloud->sh, n * sh_width * sizeof *all.sh);
-    for (size_t i = 0; i < BACKDROP_COUNT; i++) { /* evenly over the sphere: a Fibonacci spiral (Gonzalez
-                                                     2010) */
-        const size_t to = n + i;
-        const double z = 1 - (2 * (double)i + 1) / BACKDROP_COUNT, across = sqrt(1 - z * z),
-                     turn = (double)i * 2.399963229728653;
-        const double direction[3] = {across * cos(turn), across * sin(turn), z};
+    for (int i = 0; i < BACKDROP_COUNT; i++) {
+        const size_t to = n + (size_t)i;
+        double direction[3];
+        dvec_on_sphere(i, BACKDROP_COUNT, direction);
         const float dir[3] = {(float)direction[0], (float)direction[1], (float)direction[2]};
         float seen[3];
         sky_color(behind, color, dir, seen);

@@ -12,9 +12,9 @@
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/sh.h"
 #include "base/symmetric.h"
 #include "base/vec.h"
-#include "base/sh.h"
 
 enum { TERMS = GAUSSIAN_SH_COUNT, PAIRS = TERMS * (TERMS + 1) / 2, DIRECTIONS = 64, PIXEL_STEP = 2 };
 
@@ -108,21 +108,28 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     return GBT_OK;
 }
 
-/* Evenly over the sphere: a Fibonacci spiral (Gonzalez 2010). */
-static void spread_direction(int i, double out[3])
+/* What the networks are told of a distance in the middle of those trained; where the model does not say which
+   those were, the mean from a camera to an anchor. */
+static float middle_distance(const anchors *a, const decoder *d, const gbt_camera *cameras, size_t count)
 {
-    const double z = 1 - (2 * i + 1.0) / DIRECTIONS, r = sqrt(1 - z * z), turn = i * 2.399963229728653;
-    out[0] = r * cos(turn);
-    out[1] = r * sin(turn);
-    out[2] = z;
+    if (isfinite(d->distance_max))
+        return 0.5f * (d->distance_min + d->distance_max);
+    double sum = 0;
+    for (size_t i = 0; i < count; i++)
+        for (size_t k = 0; k < a->count; k++) {
+            const float *p = a->position + 3 * k;
+            const double *c = cameras[i].center;
+            sum +=
+                dvec_length((const double[3]){(double)p[0] - c[0], (double)p[1] - c[1], (double)p[2] - c[2]});
+        }
+    return (float)(sum / (double)(count * a->count)) * d->distance_scale;
 }
 
-/* All Gaussians from so far away that one direction leads to all; the networks are told a distance of the
-   middle of those trained. */
-static gbt_status add_directions(baking *b, frame *f, const decoder *trained, double prior, gbt_error *err)
+/* All Gaussians from so far away that one direction leads to all; the networks are told another distance. */
+static gbt_status add_directions(baking *b, frame *f, const decoder *trained, float middle, double prior,
+                                 gbt_error *err)
 {
     decoder d = *trained;
-    const float middle = 0.5f * (trained->distance_min + fminf(trained->distance_max, 1e30f));
     d.distance_min = 2 * middle;
     d.distance_max = 0.5f * middle; /* distances are cut to [min / 2, 2 max] */
     float size = 1;
@@ -136,7 +143,7 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, do
     gbt_status status = GBT_OK;
     for (int n = 0; n < DIRECTIONS && status == GBT_OK; n++) {
         double toward[3];
-        spread_direction(n, toward);
+        dvec_on_sphere(n, DIRECTIONS, toward);
         const float direction[3] = {(float)toward[0], (float)toward[1], (float)toward[2]};
         const float far[3] = {-1e4f * size * direction[0], -1e4f * size * direction[1],
                               -1e4f * size * direction[2]};
@@ -196,21 +203,10 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
         scale_log[k] =
             (float)(0.5 *
                     log(fmax(m[4 * k], largest / (GAUSSIAN_SCALE_RATIO * GAUSSIAN_SCALE_RATIO)) / s->weight));
-    /* The largest of the four is found first, from the diagonal: nothing is divided by something small. */
-    const double four[4] = {1 + v[0] + v[4] + v[8], 1 + v[0] - v[4] - v[8], 1 - v[0] + v[4] - v[8],
-                            1 - v[0] - v[4] + v[8]};
-    int big = 0;
-    for (int k = 1; k < 4; k++)
-        big = four[k] > four[big] ? k : big;
-    const double wx = v[7] - v[5], wy = v[2] - v[6], wz = v[3] - v[1], xy = v[3] + v[1], xz = v[2] + v[6],
-                 yz = v[7] + v[5];
-    const double rows[4][4] = {
-        {four[0], wx, wy, wz}, {wx, four[1], xy, xz}, {wy, xy, four[2], yz}, {wz, xz, yz, four[3]}};
-    double norm = 0;
+    double q[4];
+    dquat_of_matrix(v, q);
     for (int k = 0; k < 4; k++)
-        norm += rows[big][k] * rows[big][k];
-    for (int k = 0; k < 4; k++)
-        quat[k] = (float)(rows[big][k] / sqrt(norm));
+        quat[k] = (float)q[k];
 }
 
 /* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it
@@ -301,7 +297,7 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     }
     f->draw = drawing;
     if (status == GBT_OK && def->prior > 0)
-        status = add_directions(&b, f, d, def->prior, err);
+        status = add_directions(&b, f, d, middle_distance(a, d, cameras, camera_count), def->prior, err);
     if (status == GBT_OK)
         status = solve(&b, def, out, err);
     mem_free(b.sums);

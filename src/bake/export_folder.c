@@ -58,10 +58,14 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
                        laid_on[0] > 0; /* any other background is in the file, or black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
+    bool holds_out = false;
+    for (size_t i = 0; i < r->scene.view_count; i++)
+        holds_out = holds_out || r->scene.views[i].is_test;
     snprintf(text, sizeof text,
              "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=%d, "
-             "white_background=%s, data_device='cpu', eval=True)",
-             sh_degree, source, result, resolution_of(r), white ? "True" : "False");
+             "white_background=%s, data_device='cpu', eval=%s)",
+             sh_degree, source, result, resolution_of(r), white ? "True" : "False",
+             holds_out ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
     return file_write_atomic(path, text, strlen(text), err);
 }

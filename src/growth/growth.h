@@ -28,7 +28,7 @@ typedef struct growth_def {
     float grad_threshold; /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
     float importance_min; /* anchors with less in the mean over the views that show them are pruned. Default
                              0.005, an opacity */
-    float interval;       /* I: steps between rounds, default 100 */
+    float interval;       /* I: views between rounds, default 100 */
     float success_threshold; /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an
                                 anchor is judged when visit_count > interval * success. What was judged starts
                                 again from 0 */
@@ -38,7 +38,7 @@ typedef struct growth_def {
                                 ties by level, then cell. Default SIZE_MAX */
     bool integer_division; /* init_factor / hierarchy^level and hierarchy/2 are divided as integers: 4 / 16 is
                               0. Default false, as the next two */
-    bool coarse_level_gates; /* a level that adds nothing ends the search */
+    bool coarse_level_gates; /* while no level has added an anchor, finer ones are not searched */
     bool at_cell_center;     /* new anchors stand in the middle of their cell */
     uint64_t seed;           /* of the random candidate drop: level j keeps 1 - 0.5^(j+1) of the candidates */
     uint64_t step;

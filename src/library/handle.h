@@ -8,7 +8,6 @@
 
 struct gbt_model {
     loaded_run run;
-    bool views_open;
     char path[4096];         /* that it was opened from; empty: of arrays */
     float *quat_length;      /* [run.cloud.count] of the quaternions that the caller gave; NULL: all 1 */
     unsigned char *raised;   /* [run.cloud.count] bit k: the given scale_log[k] is below what is drawn */

@@ -20,8 +20,6 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-#define HALF_LOG2_E 0.72134752044448170368 /* sums are of (u, v) times its root: kernel.h */
-
 typedef struct gradient_job {
     const raster_view *view;
     const gaussians *g;

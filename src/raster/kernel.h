@@ -10,6 +10,9 @@
 #include "base/memory.h"
 #include "raster/raster.h"
 
+/* Sums are of (u, v) times its root: 2^-(u^2 + v^2) = exp(-d2 / 2). */
+#define HALF_LOG2_E 0.72134752044448170368
+
 enum {
     BLOCK_PIXELS = 4, /* a block is 4 x 4 pixels: the sixteen lanes */
     BLOCKS_ACROSS = 4,

@@ -13,12 +13,9 @@
 #include "base/vec.h"
 #include "raster/kernel.h"
 
-/* 2^-(u^2 + v^2) = exp(-d2 / 2). */
-#define HALF_LOG2_E 0.72134752044448170368
-
 typedef struct lane_splats {
     double t[3][PIXEL_LANES];    /* mean, camera axes */
-    double axis[9][PIXEL_LANES]; /* EWA: 0..5 the three axes times their scales on the image, rows x and y */
+    double axis[9][PIXEL_LANES]; /* the axes times their scales, camera axes: row r of axis k at 3 r + k */
     double x[PIXEL_LANES], y[PIXEL_LANES], xx[PIXEL_LANES], xy[PIXEL_LANES], yy[PIXEL_LANES],
         det[PIXEL_LANES], radius[PIXEL_LANES];
 } lane_splats;

@@ -197,39 +197,6 @@ typedef struct pose_curve {
     double turn_length;
 } pose_curve;
 
-/** Quaternion of a rotation matrix: from the largest of its four components, which is at least 1/2. */
-static void matrix_to_quat(const double m[9], double q[4])
-{
-    const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],
-                              1 - m[0] - m[4] + m[8]}; /* 4 q_k^2 */
-    int big = 0;
-    for (int k = 1; k < 4; k++)
-        if (square[k] > square[big])
-            big = k;
-    const double s = sqrt(square[big]), t = 0.5 / s;
-    /* 4 w x ..; 4 xy, xz, yz */
-    const double odd[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]},
-                 even[3] = {m[1] + m[3], m[2] + m[6], m[5] + m[7]};
-    q[big] = 0.5 * s;
-    if (big == 0) {
-        q[1] = t * odd[0];
-        q[2] = t * odd[1];
-        q[3] = t * odd[2];
-    } else if (big == 1) {
-        q[0] = t * odd[0];
-        q[2] = t * even[0];
-        q[3] = t * even[1];
-    } else if (big == 2) {
-        q[0] = t * odd[1];
-        q[1] = t * even[0];
-        q[3] = t * even[2];
-    } else {
-        q[0] = t * odd[2];
-        q[1] = t * even[1];
-        q[2] = t * even[2];
-    }
-}
-
 static double distance_of(const double *a, const double *b, int dimensions)
 {
     double sum = 0;
@@ -243,7 +210,7 @@ static void point_of(const gbt_camera *camera, double turn_length, const double 
                      double out[DIMENSIONS])
 {
     double q[4], dot = 0;
-    matrix_to_quat(camera->rotation, q);
+    dquat_of_matrix(camera->rotation, q);
     for (int k = 0; k < 4 && before != NULL; k++)
         dot += q[k] * before[3 + k];
     for (int k = 0; k < 3; k++)

@@ -49,15 +49,15 @@ static gbt_status take_camera(const json_fields *root, const json_t *common, siz
     json_fields own;
     camera_file file = {0};
     GBT_TRY(element_of(root, "cameras", i, prefix, &own));
-    if (json_field_given(&own, "rays"))
-        return json_field_fail(&own, "rays", "not in a path (wanted a camera)");
     json_t *merged = json_copy((json_t *)own.object);
     if (merged == NULL || json_object_update_missing(merged, (json_t *)common) != 0) {
         json_decref(merged);
         return base_fail(root->err, GBT_ERR_NO_MEMORY, "%s: no memory", root->path);
     }
     own.object = merged;
-    const gbt_status status = camera_file_take(&own, origin, &file);
+    const gbt_status status = json_field_given(&own, "rays")
+                                  ? json_field_fail(&own, "rays", "not in a path (wanted a camera)")
+                                  : camera_file_take(&own, origin, &file);
     *shot = file.shot;
     json_decref(merged);
     return status;

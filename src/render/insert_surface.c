@@ -58,9 +58,8 @@ int insert_lamp_samples(const insert_scene *in)
 static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const double dir[3],
                            double to_lamp[3])
 {
-    /* The golden angle: even over the disc (Vogel 1979). */
-    const double golden = 2.399963229728653, turn = 6.283185307179586;
-    const double angle = golden * sample + turn * (double)rng_uniform(LAMP_SEED, 0, ray);
+    /* Even over the disc (Vogel 1979). */
+    const double angle = GOLDEN_ANGLE * sample + 2 * PI * (double)rng_uniform(LAMP_SEED, 0, ray);
     const double radius = in->lamp_radius * sqrt((sample + 0.5) / INSERT_LAMP_SAMPLES),
                  any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
     double right[3], up[3];

@@ -90,12 +90,19 @@ static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *d
                               def->insert != NULL ? &tracer : NULL, err));
     if (st->in_double)
         GBT_TRY(render_reference(r, shot, err));
-    const size_t peak = mem_peak_bytes();
-    if (def->memory > 0 && peak > def->memory)
-        return base_fail(err, GBT_ERR_NO_MEMORY,
-                         "memory: %zu MB is too little: this took %zu (a .ply alone is drawn cell by cell)",
-                         def->memory >> 20, (peak >> 20) + 1);
     return GBT_OK;
+}
+
+/* What is drawn whole is drawn, and then it is said how much that took. */
+static gbt_status check_memory(const studio *st, const gbt_render_def *def, gbt_error *err)
+{
+    const size_t peak = mem_peak_bytes();
+    if (def->memory == 0 || peak <= def->memory || st->run.cells.count > 0)
+        return GBT_OK;
+    return base_fail(
+        err, GBT_ERR_NO_MEMORY,
+        "memory: %zu MB is too little: this took %zu (all is done; a .ply alone is drawn cell by cell)",
+        def->memory >> 20, (peak >> 20) + 1);
 }
 
 static gbt_status write_one(studio *st, const ray_shot *shot, const char *out, const char *name,
@@ -303,12 +310,6 @@ static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_err
         *renderer = GBT_RENDERER_TRACE;
     else if (def->renderer != GBT_RENDERER_AS_TRAINED)
         *renderer = def->renderer;
-    if (st->run.cells.count > 0 &&
-        (st->in_double || *renderer != GBT_RENDERER_TRACE || def->insert != NULL || st->outputs != 0))
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
-            "trace, no outputs, no meshes)");
     if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     if (st->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
@@ -398,7 +399,15 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
     bool large = false;
     folder_of(out, folder);
     if (def->memory > 0)
-        GBT_TRY(loaded_run_open_cells(run, def->memory, folder, &large, r, err));
+        GBT_TRY(loaded_run_is_larger(run, def->memory, &large, err));
+    const bool is_traced = def->renderer == GBT_RENDERER_AS_TRAINED || def->renderer == GBT_RENDERER_TRACE;
+    if (large && (!is_traced || def->insert != NULL || def->outputs != NULL))
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
+            "trace, no outputs, no meshes)");
+    if (large)
+        GBT_TRY(loaded_run_open_cells(run, def->memory, folder, r, err));
     if (large)
         return wants_views(def) ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
     return wants_views(def) ? loaded_run_open(run, def->data, def->downscale, r, err)
@@ -426,6 +435,8 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         status = def->path != NULL     ? render_film(st, out, def, err)
                  : def->camera != NULL ? render_camera(st, out, def, err)
                                        : render_views(st, out, def, err);
+    if (status == GBT_OK)
+        status = check_memory(st, def, err);
     insert_scene_free(&st->insert);
     loaded_run_close(&st->run);
     mem_free(st);

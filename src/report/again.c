@@ -12,6 +12,7 @@
 #include "gbtrace/evaluate.h"
 #include "report/metrics.h"
 #include "report/report.h"
+#include "report/studies.h"
 
 static size_t count_or_zero(double value) { return value >= 1 && value < 1e15 ? (size_t)value : 0; }
 
@@ -61,6 +62,9 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
     for (size_t i = 0; i < study_count; i++)
         if (!file_exists(studies[i]))
             return base_fail(err, GBT_ERR_IO, "%s: no such file or folder (wanted what gbtrace study wrote)",
+                             studies[i]);
+        else if (!file_is_folder(studies[i]) && !report_is_chart(studies[i]))
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: no chart (wanted .svg, or a folder of them)",
                              studies[i]);
     GBT_TRY(file_join(path, sizeof path, run, "metrics.json", err));
     if (file_is_folder(run) && !file_exists(path))

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/shell_word.h"
 #include "gbtrace/version.h"
 #include "report/metrics.h"
 #include "report/rows.h"
@@ -123,23 +124,6 @@ void report_facts(text *out, const evaluation *e, const json_t *metrics, const c
     text_add(out, "</section>\n");
 }
 
-/* The command that trained, as it was typed; what was typed to go on with a run does not say how it began. */
-static void add_command(text *out, const char *run, const json_t *metrics, bool resumed)
-{
-    const char *command = metrics_text(metrics, "command"), *data = metrics_text(metrics, "data");
-    if (resumed) {
-        text_add(out, "gbtrace train --config ");
-        text_escaped(out, run);
-        text_add(out, "/config -o NEW");
-    } else if (command != NULL) {
-        text_escaped(out, command);
-    } else {
-        text_add(out, "gbtrace train ");
-        text_escaped(out, data != NULL ? data : "DATA");
-        text_add(out, " -o NEW");
-    }
-}
-
 void report_again(text *out, const char *run, const json_t *metrics)
 {
     const char *command = metrics_text(metrics, "command");
@@ -147,20 +131,22 @@ void report_again(text *out, const char *run, const json_t *metrics)
     text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how "
                   "many steps there are. With the pace that this run recorded, the same photos give the same "
                   "model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
-    add_command(out, run, metrics, resumed);
-    if (command == NULL || resumed || strstr(command, "--pace") == NULL) {
-        const size_t before = out->length;
-        text_add(out, " --pace ");
-        if (!add_pace(out, metrics))
-            out->length = out->status == GBT_OK ? before : out->length;
-    }
+    char config[4096], word[8192];
+    snprintf(config, sizeof config, "%s/config", run);
+    text_add(out, "gbtrace train --config ");
+    text_escaped(out, shell_word(config, word, sizeof word));
+    text_add(out, " -o NEW");
+    const size_t before = out->length;
+    text_add(out, " --pace ");
+    if (!add_pace(out, metrics))
+        out->length = out->status == GBT_OK ? before : out->length;
     text_add(out, "</pre>\n");
     if (resumed)
         text_add(out, "<p>If the run was given another length when it was resumed, its first steps had the "
                       "schedules of the former length, and this makes another model.</p>\n");
     text_add(out, "<p>The scores, the pictures and this page, from the model (<code>gbtrace "
                   "report</code> makes the page alone):</p>\n<pre class=\"card\">gbtrace eval ");
-    text_escaped(out, run);
+    text_escaped(out, shell_word(run, word, sizeof word));
     text_add(
         out,
         "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in "

@@ -15,11 +15,12 @@ enum { CHART_BYTES_MAX = 1000000, CHARTS_MAX = 16, PATH_LIMIT = 4096 };
 /* The studies of this program, by the names of their files. */
 static const struct {
     const char *name, *title;
-} known[] = {{"speed", "Speed against accuracy"}, {"crosscheck", "Tracer against rasterizer"},
-             {"rate", "Bytes against quality"},   {"stability", "Where renderers fail"},
-             {"paper", "The paper's tables"},     {"time", "Quality against time"}};
+} known[] = {{"speed", "Speed against accuracy"},   {"crosscheck", "Tracer against rasterizer"},
+             {"rate", "Bytes against quality"},     {"stability", "Where renderers fail"},
+             {"paper", "The paper's tables"},       {"time", "Quality against time"},
+             {"anchors", "Quality against anchors"}};
 
-static bool is_chart(const char *name)
+bool report_is_chart(const char *name)
 {
     const size_t length = strlen(name);
     return length > 4 && name[0] != '.' && strcmp(name + length - 4, ".svg") == 0;
@@ -42,8 +43,10 @@ static void add_chart(text *out, const char *path, int *count)
     unsigned char *bytes;
     size_t size;
     gbt_error why = {0};
-    if (*count == CHARTS_MAX)
+    if (*count == CHARTS_MAX) {
+        log_warn("%s: not in the report (at most %d charts)", path, (int)CHARTS_MAX);
         return;
+    }
     if (file_read(path, &bytes, &size, &why) != GBT_OK) {
         log_warn("%s", why.text);
         return;
@@ -64,7 +67,7 @@ static void add_chart(text *out, const char *path, int *count)
     mem_free(bytes);
 }
 
-static int only_charts(const struct dirent *entry) { return is_chart(entry->d_name); }
+static int only_charts(const struct dirent *entry) { return report_is_chart(entry->d_name); }
 
 /** Charts of a folder by name, so that the page does not depend on the order in which the disk lists them. */
 static void add_folder(text *out, const char *folder, int *count)
@@ -90,10 +93,13 @@ void report_studies(text *out, const char *run, const char *const *studies, size
     if (file_join(path, sizeof path, run, "studies", &ignored) == GBT_OK)
         add_folder(out, path, &count);
     for (size_t i = 0; i < study_count; i++) {
-        if (is_chart(studies[i]))
+        const int before = count;
+        if (report_is_chart(studies[i]))
             add_chart(out, studies[i], &count);
         else
             add_folder(out, studies[i], &count);
+        if (count == before && count < CHARTS_MAX && file_is_folder(studies[i]))
+            log_warn("%s: no charts in it", studies[i]);
     }
     if (count > 0)
         text_add(out, "</div></section>\n");

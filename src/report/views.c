@@ -167,13 +167,17 @@ static void add_cell(text *out, double value, int decimals)
         text_number(out, value, decimals);
 }
 
-static void add_row(text *out, const char *run, const evaluation *e, size_t index, size_t place, double low,
-                    double high)
+/* The row of a view leads to its pictures above; where they are not shown, who looks for them comes here. */
+static void add_row(text *out, const char *run, const evaluation *e, size_t index, bool is_shown,
+                    size_t place, double low, double high)
 {
     const view_score *v = &e->views[index];
-    text_format(out, "<tr data-place=\"%zu\"><th><a href=\"#view-%zu\">", place, index);
+    if (is_shown)
+        text_format(out, "<tr data-place=\"%zu\"><th><a href=\"#view-%zu\">", place, index);
+    else
+        text_format(out, "<tr data-place=\"%zu\" id=\"view-%zu\"><th>", place, index);
     text_escaped(out, v->name);
-    text_add(out, "</a></th>");
+    text_add(out, is_shown ? "</a></th>" : "</th>");
     add_cell(out, v->psnr, 2);
     const double share = isfinite(v->psnr) && high > low ? (v->psnr - low) / (high - low) : 1;
     text_format(out, "<i class=\"meter\" style=\"--share:%.0f%%\"></i></td>", 100 * fmin(fmax(share, 0), 1));
@@ -195,7 +199,8 @@ static void add_row(text *out, const char *run, const evaluation *e, size_t inde
     text_add(out, "</td></tr>");
 }
 
-static void add_table(text *out, const char *run, const evaluation *e, const size_t *order)
+static void add_table(text *out, const char *run, const evaluation *e, const size_t *order,
+                      const size_t *shown, size_t shown_count)
 {
     double low = INFINITY, high = -INFINITY;
     for (size_t i = 0; i < e->view_count; i++)
@@ -212,8 +217,12 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
         "data-sort=\"number\">FLIP</th>%s<th data-sort=\"number\">Gaussians</th><th "
         "data-sort=\"number\">Render, s</th><th>Whole pictures</th></tr></thead><tbody>",
         e->view_count, e->lpips_network != NULL ? "<th data-sort=\"number\">LPIPS</th>" : "");
-    for (size_t i = 0; i < e->view_count; i++)
-        add_row(out, run, e, order[i], i, low, high);
+    for (size_t i = 0; i < e->view_count; i++) {
+        size_t k = 0;
+        while (k < shown_count && shown[k] != order[i])
+            k++;
+        add_row(out, run, e, order[i], k < shown_count, i, low, high);
+    }
     text_add(out, "</tbody></table></div></details>\n");
 }
 
@@ -268,7 +277,7 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
         text_escaped(out, protocol);
         text_add(out, ".</p>\n");
     }
-    add_table(out, run, e, order);
+    add_table(out, run, e, order, shown, count);
     text_add(out, "</section>\n");
     mem_free(order);
 }

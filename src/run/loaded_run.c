@@ -63,9 +63,12 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
     gaussian_middle(c->mean, c->count, low, high, middle);
     for (size_t i = 0; i < 3 * c->count; i++)
         c->mean[i] = (float)((double)c->mean[i] - middle[i % 3]);
-    for (int k = 0; k < 3; k++) {
+    for (size_t k = 0; k < 3; k++) {
+        const double before = r->model.origin[k];
         r->model.origin[k] = c->origin[k] + middle[k];
         c->origin[k] = 0;
+        for (size_t i = 0; i < r->scene.view_count; i++) /* of views that are open */
+            r->scene.views[i].camera.center[k] += before - r->model.origin[k];
     }
 }
 
@@ -94,12 +97,10 @@ static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *fo
     return GBT_OK;
 }
 
-gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
-                                 loaded_run *out, gbt_error *err)
+gbt_status loaded_run_is_larger(const char *run, size_t memory, bool *large, gbt_error *err)
 {
     char ply[RESULT_PATH_SIZE];
     gaussian_ply_parts parts;
-    memset(out, 0, sizeof *out);
     GBT_TRY(find_ply(run, ply, large, err));
     if (!*large)
         return GBT_OK;
@@ -107,8 +108,16 @@ gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *fol
     *large = gaussian_ply_open(ply, &parts, &why) == GBT_OK &&
              cell_memory_whole(parts.count, parts.file.size) > memory;
     gaussian_ply_close(&parts);
-    if (!*large)
-        return GBT_OK;
+    return GBT_OK;
+}
+
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, loaded_run *out,
+                                 gbt_error *err)
+{
+    char ply[RESULT_PATH_SIZE];
+    bool found;
+    memset(out, 0, sizeof *out);
+    GBT_TRY(find_ply(run, ply, &found, err));
     loaded_run_draw_plain(out);
     GBT_TRY(cell_store_make(ply, folder, memory, 0, &out->cells, err));
     memcpy(out->model.origin, out->cells.origin, sizeof out->model.origin);
@@ -162,9 +171,9 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
     if (downscale <= 0)
         downscale = out->def.downscale;
     if (downscale <= 0 && out->picture_width > 0)
-        downscale = photos_downscale_to(&out->scene, out->picture_width);
+        GBT_TRY(photos_downscale_to(&out->scene, out->picture_width, &downscale, err));
     if (downscale <= 0) /* Gaussians of others, whose file says nothing */
-        downscale = photos_usual_downscale(&out->scene, true);
+        GBT_TRY(photos_usual_downscale(&out->scene, true, &downscale, err));
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
 
@@ -197,6 +206,9 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     if (data == NULL && is_plain(out) && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: plain Gaussians know no cameras (wanted `camera` or `data`)", run);
+    if (data == NULL && out->data.tried[0] == '\0')
+        return base_fail(err, GBT_ERR_IO, "%.1000s: the model names no data set; `data` says where it is",
+                         run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
                          "%.300s: its data set is not there (tried %.1200s); `data` says where it is now",

@@ -49,15 +49,14 @@ frame_subject loaded_run_subject(const loaded_run *r);
 /** The same without the data set: no views, no photos. For cameras that come from elsewhere. */
 gbt_status loaded_run_open_model(const char *run, loaded_run *out, gbt_error *err);
 
-/**
- * The same of a .ply of plain Gaussians, or a result folder with one, that would take more than `memory`
- * bytes: it is sorted into out->cells, to be drawn by cell_draw() alone.
- *
- * @param folder [in]  where the temporary file is made
- * @param large  [out] false: it would not, or it is something else; nothing has been opened then
- */
-gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, bool *large,
-                                 loaded_run *out, gbt_error *err);
+/** Whether it is a .ply of plain Gaussians, or a result folder with one, that would take more than `memory`
+    bytes. */
+gbt_status loaded_run_is_larger(const char *run, size_t memory, bool *large, gbt_error *err);
+
+/** What is larger than `memory`: sorted into out->cells, to be drawn by cell_draw() alone. `folder`: where
+   the temporary file is made. */
+gbt_status loaded_run_open_cells(const char *run, size_t memory, const char *folder, loaded_run *out,
+                                 gbt_error *err);
 
 /** The other half of loaded_run_open(), for a run that has no views open: `run` is what messages call it. */
 gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,

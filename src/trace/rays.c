@@ -247,7 +247,7 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
     if (!camera_lens_prepare(camera, lens))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "camera: model %d has unusable parameters (wanted a known model, finite values, "
-                         "focal length > 0)",
+                         "focal length > 0, a shape that the model has)",
                          (int)camera->model);
     if ((unsigned)camera->shutter > GBT_CAMERA_SHUTTER_COLUMNS)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: shutter %d (wanted 0 to %d)", (int)camera->shutter,

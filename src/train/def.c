@@ -2,7 +2,12 @@
 /* train/def.c -- the def of training: made, checked, and what 0 stands for in it. */
 #include "train/def.h"
 
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
 #include "base/def.h"
+#include "base/log.h"
 #include "train/rules.h"
 #include "train/settings.h"
 
@@ -44,4 +49,25 @@ void train_def_settle(gbt_train_def *d)
         d->footprint = 0;
     if (!rules.uses_near)
         d->near = 0;
+}
+
+void train_def_warn_unused(const gbt_train_def *d)
+{
+    const gbt_train_def usual = gbt_train_def_default();
+    const struct {
+        const char *name;
+        double value, usual;
+    } own[] = {{"splats_until", d->splats_until, usual.splats_until},
+               {"threshold_factor", d->threshold_factor, usual.threshold_factor},
+               {"final_prune_factor", d->final_prune_factor, usual.final_prune_factor},
+               {"start_level", d->start_level, usual.start_level},
+               {"near", d->near, usual.near},
+               {"footprint", d->footprint, usual.footprint}};
+    char names[256] = "";
+    for (size_t i = 0; d->compat && i < sizeof own / sizeof *own; i++)
+        if (fabs(own[i].value - own[i].usual) > 0 && own[i].value != 0) /* 0: as a run's config says of it */
+            snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s",
+                     names[0] != '\0' ? ", " : "", own[i].name);
+    if (names[0] != '\0')
+        log_warn("%s: not used with compat", names);
 }

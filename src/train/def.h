@@ -16,4 +16,7 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
 /** Values for what 0 leaves to us, and for what `compat` decides. A second call changes nothing. */
 void train_def_settle(gbt_train_def *d);
 
+/** A warning when something is given that compat does not use. */
+void train_def_warn_unused(const gbt_train_def *d);
+
 #endif

@@ -76,7 +76,7 @@ gbt_status exposures_write(const exposures *e, const char *const *names, const c
         json_t *numbers = json_array(), *photo = json_object();
         for (size_t k = 0; k < AFFINE_NUMBERS; k++)
             json_array_append_new(numbers, json_real((double)e->matrix[i * AFFINE_NUMBERS + k]));
-        json_object_set_new(photo, "name", json_string(names[i]));
+        json_object_set_new(photo, "name", json_text(names[i]));
         json_object_set_new(photo, "matrix", numbers);
         json_array_append_new(photos, photo);
     }

@@ -11,13 +11,14 @@
 #include "base/file.h"
 #include "train/event_records.h"
 #include "train/pose_file.h"
+#include "train/run_split.h"
 
 enum { OLD_PATH_SIZE = 4096 };
 
 static const char *const left[] = {
-    "report.html",    "metrics.json",        "train.json",   EVENTS_TRAIN_NAME,
-    EVENTS_EVAL_NAME, "exposure.json",       POSE_FILE_NAME, "checkpoints/last.gbt.prev",
-    "model.gbt",      "checkpoints/last.gbt"};
+    "report.html",    "metrics.json",  "train.json",          EVENTS_TRAIN_NAME,
+    EVENTS_EVAL_NAME, "exposure.json", POSE_FILE_NAME,        "checkpoints/last.gbt.prev",
+    RUN_SPLIT_NAME,   "model.gbt",     "checkpoints/last.gbt"};
 
 static gbt_status remove_file(const char *folder, const char *name, gbt_error *err)
 {

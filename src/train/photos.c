@@ -23,13 +23,14 @@ static double median(float *values, size_t count)
     return (double)values[count / 2];
 }
 
-double photos_downscale_to(const scene *s, double width)
+gbt_status photos_downscale_to(const scene *s, double width, double *downscale, gbt_error *err)
 {
-    float *widths = mem_alloc(2 * s->view_count + 1, sizeof *widths, "photo widths", NULL);
-    if (widths == NULL || s->view_count == 0) {
-        mem_free(widths);
-        return 1;
-    }
+    *downscale = 1;
+    if (s->view_count == 0)
+        return GBT_OK;
+    float *widths = mem_alloc(2 * s->view_count, sizeof *widths, "photo widths", err);
+    if (widths == NULL)
+        return GBT_ERR_NO_MEMORY;
     float *ratios = widths + s->view_count; /* of the cameras' widths to them */
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
@@ -41,12 +42,13 @@ double photos_downscale_to(const scene *s, double width)
     }
     const double is = median(widths, s->view_count), ratio = median(ratios, s->view_count);
     mem_free(widths);
-    return ratio * fmax(1, is / width);
+    *downscale = ratio * fmax(1, is / width);
+    return GBT_OK;
 }
 
-double photos_usual_downscale(const scene *s, bool limits_width)
+gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *downscale, gbt_error *err)
 {
-    return photos_downscale_to(s, limits_width ? USUAL_WIDTH : HUGE_VAL);
+    return photos_downscale_to(s, limits_width ? USUAL_WIDTH : HUGE_VAL, downscale, err);
 }
 
 /* Nothing but time depends on it. */

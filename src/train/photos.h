@@ -38,11 +38,12 @@ typedef struct photo_sample {
 } photo_sample;
 
 /** By which the cameras of a scene are divided so that the median photo has this width: to the size of their
-    photos if these are smaller than they, and further if it is wider. Cost: opens every photo. */
-double photos_downscale_to(const scene *s, double width);
+    photos if these are smaller than they, and further if it is wider. GBT_OK or GBT_ERR_NO_MEMORY. Cost:
+   opens every photo. */
+gbt_status photos_downscale_to(const scene *s, double width, double *downscale, gbt_error *err);
 
 /** The same where nobody says a width: 1,600 pixels if `limits_width`, else as wide as it is. */
-double photos_usual_downscale(const scene *s, bool limits_width);
+gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *downscale, gbt_error *err);
 
 /** `downscale` 0 is 1. */
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);

@@ -71,7 +71,7 @@ typedef struct train_rules {
     bool grows_at_points;      /* sparse points are candidates too */
     bool needs_two_views;      /* new anchors stand where two training photos look */
     bool integer_division;     /* of cell sizes and thresholds of levels: 4 / 16 is 0 */
-    bool coarse_level_gates;   /* a level that adds nothing ends the search */
+    bool coarse_level_gates;   /* while no level has added an anchor, finer ones are not searched */
     bool at_cell_center;       /* new anchors stand in the middle of their cell; else at the candidate */
     float shape_log_max;       /* scale_log[3..5] are cut to this in a round */
 } train_rules;

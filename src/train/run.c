@@ -195,7 +195,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         GBT_TRY(save_finish(c->saving, err));
     GBT_TRY(check_memory(t, paths, err));
 
-    bool stop = stop_signal_seen() || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
+    bool stop = stop_signal_seen();
     if (!stop && c->next_eval < def->eval_at_count && t->seconds >= def->eval_at_seconds[c->next_eval]) {
         const double before = clock_wall();
         gbt_error why = {0};
@@ -206,6 +206,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         c->paused += clock_wall() - before;
         c->next_eval++;
     }
+    stop = stop || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
     const bool asked = def->save_at_step > 0 && t->step == def->save_at_step;
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);

@@ -11,6 +11,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
+#include "base/machine.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "bvh/device.h"
@@ -70,9 +71,33 @@ static size_t header_text(char *out, size_t size)
     return used;
 }
 
+/* The score of held-out photos that a row may hold. */
+static void recall_evaluation(run_log *log, const char *row, size_t length)
+{
+    char line[2048];
+    double seconds = 0, psnr = (double)NAN;
+    snprintf(line, sizeof line, "%.*s", length < sizeof line ? (int)length : (int)sizeof line - 1, row);
+    const char *field = line;
+    for (int i = 0; i < COLUMN_COUNT && field != NULL; i++) {
+        char *end;
+        const double value = strtod(field, &end);
+        if (end != field && strcmp(columns[i].name, "seconds") == 0)
+            seconds = value;
+        if (end != field && strcmp(columns[i].name, "test_psnr") == 0)
+            psnr = value;
+        field = strchr(field, ',');
+        field = field != NULL ? field + 1 : NULL;
+    }
+    if (isnan(psnr) || log->evaluated_count == GBT_TRAIN_MAX_EVALS)
+        return;
+    log->evaluated_seconds[log->evaluated_count] = seconds;
+    log->evaluated_step[log->evaluated_count] = strtoull(line, NULL, 10);
+    log->evaluated_psnr[log->evaluated_count++] = psnr;
+}
+
 /* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or
    that a kill cut short, go. */
-static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *err)
+static gbt_status rewind_rows(run_log *log, const char *csv_path, uint64_t step, gbt_error *err)
 {
     char header[1024];
     const size_t header_size = header_text(header, sizeof header);
@@ -83,9 +108,11 @@ static gbt_status rewind_rows(const char *csv_path, uint64_t step, gbt_error *er
     if (size >= header_size && memcmp(bytes, header, header_size) == 0)
         kept = header_size;
     for (const unsigned char *end; kept > 0 && (end = memchr(bytes + kept, '\n', size - kept)) != NULL;
-         kept = (size_t)(end - bytes) + 1)
+         kept = (size_t)(end - bytes) + 1) {
         if (strtoull((const char *)bytes + kept, NULL, 10) > step)
             break;
+        recall_evaluation(log, (const char *)bytes + kept, (size_t)(end - bytes) - kept);
+    }
     const gbt_status status = kept > 0 ? file_write_atomic(csv_path, bytes, kept, err)
                                        : file_write_atomic(csv_path, header, header_size, err);
     mem_free(bytes);
@@ -126,7 +153,7 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
 {
     memset(log, 0, sizeof *log);
     log->last_row_seconds = t->seconds;
-    GBT_TRY(rewind_rows(csv_path, t->step, err));
+    GBT_TRY(rewind_rows(log, csv_path, t->step, err));
     if (t->def.tensorboard)
         GBT_TRY(rewind_events(log, events_path, t->step, err));
     log->csv = fopen(csv_path, "a");
@@ -280,8 +307,9 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
                               json_pack("{s:f,s:I,s:f}", "seconds", log->evaluated_seconds[i], "step",
                                         (json_int_t)log->evaluated_step[i], "psnr", log->evaluated_psnr[i]));
     json_object_set_new(root, "schema", json_integer(1));
-    json_object_set_new(root, "command", json_string(t->def.command));
-    json_object_set_new(root, "data", json_string(t->scene.folder));
+    if (t->def.command != NULL)
+        json_object_set_new(root, "command", json_text(t->def.command));
+    json_object_set_new(root, "data", json_text(t->scene.folder));
     json_object_set_new(root, "start", json_string(t->start_text));
     json_object_set_new(root, "points", json_integer((json_int_t)t->points_used));
     json_object_set_new(root, "anchors_initial", json_integer((json_int_t)t->anchors_initial));
@@ -308,12 +336,14 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "pace", parts);
     json_object_set_new(root, "held_out", evals);
     json_object_set_new(root, "downscale", json_real(t->def.downscale));
-    json_object_set_new(root, "eval_split", json_string(t->def.eval_split));
-    json_object_set_new(root, "seed", json_integer((json_int_t)t->def.seed));
+    json_object_set_new(root, "eval_split", json_text(t->def.eval_split));
+    char seed[32]; /* JSON's whole numbers end at 2^63 - 1 */
+    snprintf(seed, sizeof seed, "%llu", (unsigned long long)t->def.seed);
+    json_object_set_new(root, "seed",
+                        t->def.seed > INT64_MAX ? json_text(seed) : json_integer((json_int_t)t->def.seed));
     json_object_set_new(root, "threads", json_integer(parallel_threads()));
-    char processor[128];
-    cpu_processor_name(processor, sizeof processor);
-    json_object_set_new(root, "processor", json_string(processor));
+    const machine here = machine_read("");
+    json_object_set_new(root, "processor", json_text(here.processor[0] != '\0' ? here.processor : "?"));
     json_object_set_new(root, "isa", json_string(cpu_isa_name(cpu_best_isa())));
     json_object_set_new(root, "embree_version", json_string(bvh_embree_version()));
     json_object_set_new(root, "peak_memory_bytes", json_integer((json_int_t)mem_peak_bytes()));

@@ -7,14 +7,12 @@
 #include "base/fail.h"
 #include "base/file.h"
 
-static const char list_name[] = "held-out.txt";
-
 gbt_status run_split_text(const char *run, const char *text, char out[RUN_SPLIT_TEXT_SIZE], gbt_error *err)
 {
     scene_split split;
     char own[4096];
     GBT_TRY(scene_split_parse(text, &split, err));
-    GBT_TRY(file_join(own, sizeof own, run, list_name, err));
+    GBT_TRY(file_join(own, sizeof own, run, RUN_SPLIT_NAME, err));
     const bool has_own = split.kind == SCENE_SPLIT_LIST && file_exists(own);
     const int length =
         has_own ? snprintf(out, RUN_SPLIT_TEXT_SIZE, "%.*s%s", (int)(split.list_path - text), text, own)
@@ -27,7 +25,7 @@ gbt_status run_split_text(const char *run, const char *text, char out[RUN_SPLIT_
 gbt_status run_split_save(const char *run, const scene *s, gbt_error *err)
 {
     char path[4096];
-    GBT_TRY(file_join(path, sizeof path, run, list_name, err));
+    GBT_TRY(file_join(path, sizeof path, run, RUN_SPLIT_NAME, err));
     return s->held_out_list != NULL ? file_write_atomic(path, s->held_out_list, s->held_out_bytes, err)
                                     : GBT_OK;
 }

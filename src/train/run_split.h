@@ -6,6 +6,8 @@
 
 #include "data/scene.h"
 
+#define RUN_SPLIT_NAME "held-out.txt"
+
 enum { RUN_SPLIT_TEXT_SIZE = 8192 };
 
 /** `text`, a gbt_train_def.eval_split, with the run's own list in place of the one that it names; unchanged

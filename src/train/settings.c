@@ -4,8 +4,10 @@
    gbt_train_def and a row here. */
 #include "train/settings.h"
 
+#include <errno.h>
 #include <float.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -278,11 +280,29 @@ static char *text_of(const gbt_train_setting *s, setting_texts *texts)
     return texts->text[index];
 }
 
+/* A whole number: digits alone, which are exact up to 2^64, or what other programs write of one, 1e5 or
+ * 100.0. */
+static bool read_whole(const char *text, uint64_t *out)
+{
+    char *end;
+    if (text[0] != '\0' && text[strspn(text, "0123456789")] == '\0') {
+        errno = 0;
+        *out = strtoull(text, NULL, 10);
+        return errno == 0;
+    }
+    const double number = strtod(text, &end);
+    const bool is_whole =
+        end != text && *end == '\0' && number >= 0 && number < 0x1p53 && number == floor(number);
+    *out = is_whole ? (uint64_t)number : 0;
+    return is_whole;
+}
+
 bool setting_read(const gbt_train_setting *s, const char *text, setting_texts *texts, gbt_train_def *def)
 {
     char *end;
     const double number = strtod(text, &end);
     const bool is_number = end != text && *end == '\0';
+    uint64_t whole;
     char *kept;
     switch (s->kind) {
     case GBT_SETTING_TEXT:
@@ -298,12 +318,17 @@ bool setting_read(const gbt_train_setting *s, const char *text, setting_texts *t
         *(bool *)place(s, def) = strcmp(text, "true") == 0 || (is_number && number != 0);
         return is_number || strcmp(text, "true") == 0 || strcmp(text, "false") == 0;
     case GBT_SETTING_UINT64:
-        *(uint64_t *)place(s, def) = strtoull(text, NULL, 10);
-        return is_number;
+        return read_whole(text, place(s, def));
     case GBT_SETTING_BYTES:
-        *(size_t *)place(s, def) = (size_t)strtoull(text, NULL, 10);
-        return is_number;
+        if (!read_whole(text, &whole))
+            return false;
+        *(size_t *)place(s, def) = (size_t)whole;
+        return true;
     case GBT_SETTING_INT:
+        if (!(number >= INT_MIN && number <= INT_MAX && number == floor(number)))
+            return false;
+        set_number(s, number, def);
+        return is_number;
     case GBT_SETTING_FLOAT:
     case GBT_SETTING_DOUBLE:
     case GBT_SETTING_SECONDS:

@@ -209,6 +209,7 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
 {
     GBT_TRY(train_def_check(def, err));
     t->def = *def;
+    train_def_warn_unused(def);
     train_def_settle(&t->def);
     GBT_TRY(take_length(t, err));
     GBT_TRY(config_check(&t->def, data, err));

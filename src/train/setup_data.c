@@ -125,17 +125,18 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
 }
 
 /* What cameras are divided by, where that was left open. */
-static void choose_downscale(trainer *t)
+static gbt_status choose_downscale(trainer *t, gbt_error *err)
 {
     if (t->def.downscale > 0)
-        return;
-    t->def.downscale = photos_usual_downscale(&t->scene, t->rules.limits_width);
+        return GBT_OK;
+    GBT_TRY(photos_usual_downscale(&t->scene, t->rules.limits_width, &t->def.downscale, err));
     if (t->def.downscale > 1)
         log_info(
             "%s: photos are trained on %.0f pixels wide, the %d of their cameras divided by %.4g (downscale "
             "says otherwise)",
             t->scene.folder, t->scene.views[t->train_views[0]].camera.width / t->def.downscale,
             t->scene.views[t->train_views[0]].camera.width, t->def.downscale);
+    return GBT_OK;
 }
 
 /* Before any work: a limit that cannot be kept. */
@@ -216,7 +217,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     if (check.refused.status != GBT_OK)
         return base_fail(err, check.refused.status, "%s", check.refused.text);
     photo_check_warn(&check, data);
-    choose_downscale(t);
+    GBT_TRY(choose_downscale(t, err));
     GBT_TRY(check_memory(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)

@@ -280,7 +280,7 @@ void trainer_free(trainer *t)
     mem_free(t->scale_log_max);
     decoder_free(&t->decoder);
     growth_stats_free(&t->stats);
-    for (size_t i = 0; i < t->view_count; i++)
+    for (size_t i = 0; t->views != NULL && i < t->view_count; i++)
         step_view_free(&t->views[i]);
     mem_free(t->views);
     row_list *const rows[] = {&t->own_rows, &t->rows, &t->received, &t->owned};

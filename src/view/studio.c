@@ -13,6 +13,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/json_out.h"
+#include "data/result_folder.h"
 
 static bool is_same_file(const struct stat *a, const struct stat *b)
 {
@@ -85,6 +86,14 @@ gbt_status studio_open(const char *input, const char *data, studio *out, gbt_err
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
     }
     GBT_TRY(file_stat(out->model_path, &file, &exists, err));
+    if (!exists && folder) {
+        result_folder found;
+        GBT_TRY(result_folder_find(input, &found, &exists, err));
+        if (exists) {
+            memcpy(out->model_path, found.ply, sizeof found.ply);
+            GBT_TRY(file_stat(out->model_path, &file, &exists, err));
+        }
+    }
     if (exists)
         return reopen(out, &file, err);
     if (!folder || !file_exists(config))

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include "gbtrace/make_scene.h"
 #include "gbtrace/model.h"
 
 enum { W = 9, H = 7, COUNT = 2 };
@@ -116,6 +117,40 @@ static void what_can_be_asked(void **state)
     assert_int_equal(count, 0);
     assert_refused(gbt_model_get_view(model, 0, &view, &none), &none, GBT_ERR_ARGUMENT, "view 0");
     gbt_model_close(model);
+}
+
+/* Cameras stay where they are in the world when the Gaussians are others. */
+static void views_stay_with_other_gaussians(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/gbt_views_XXXXXX", data[64], command[128];
+    assert_non_null(mkdtemp(folder));
+    snprintf(data, sizeof data, "%s/data", folder);
+    gbt_make_scene_def def = gbt_make_scene_def_default();
+    def.width = 16;
+    def.height = 12;
+    def.view_count = 4;
+    def.samples = 1;
+    def.points = 50;
+    assert_ok(gbt_make_scene(&def, data, NULL));
+    gbt_model *model = made();
+    size_t count;
+    assert_ok(gbt_model_open_views(model, data, &count, NULL));
+    assert_int_equal(count, 4);
+    gbt_model_view before, after;
+    assert_ok(gbt_model_get_view(model, 2, &before, NULL));
+    float moved[3 * COUNT];
+    for (int i = 0; i < 3 * COUNT; i++)
+        moved[i] = mean[i] + 7;
+    gbt_gaussians g = two();
+    g.mean = moved;
+    assert_ok(gbt_model_set_gaussians(model, &g, NULL));
+    assert_ok(gbt_model_get_view(model, 2, &after, NULL));
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(before.camera.center[k] - after.camera.center[k]) < 1e-12);
+    gbt_model_close(model);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    assert_int_equal(system(command), 0);
 }
 
 static void settings_are_checked(void **state)
@@ -291,6 +326,7 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_opened),
                                        cmocka_unit_test(gaussians_that_are_refused),
                                        cmocka_unit_test(what_can_be_asked),
+                                       cmocka_unit_test(views_stay_with_other_gaussians),
                                        cmocka_unit_test(settings_are_checked),
                                        cmocka_unit_test(pictures_go_where_they_should),
                                        cmocka_unit_test(one_far_from_the_others),

@@ -289,6 +289,7 @@ static void an_overwritten_run_is_gone(void **state)
     static const char *const old[] = {"checkpoints/last.gbt",
                                       "checkpoints/last.gbt.prev",
                                       "model.gbt",
+                                      "held-out.txt",
                                       "poses.json",
                                       "exposure.json",
                                       "train.json",

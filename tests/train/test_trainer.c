@@ -1165,6 +1165,41 @@ static void settings_are_whole(void **state)
     assert_int_equal(texts, SETTING_TEXTS);
 }
 
+/* No text is taken for another number. */
+static void whole_numbers_are_whole(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text;
+        double wanted; /* NaN: refused */
+    } rows[] = {{"iterations", "40", 40},
+                {"iterations", "4e1", 40},
+                {"iterations", "40.0", 40},
+                {"iterations", "0x20", 32},
+                {"iterations", "12.9", NAN},
+                {"iterations", "-1", NAN},
+                {"seed", "18446744073709551615", 18446744073709551615.0},
+                {"seed", "18446744073709551616", NAN},
+                {"max-anchors", "2e+06", 2000000},
+                {"views", "2", 2},
+                {"views", "2.9", NAN},
+                {"offsets", "3e10", NAN},
+                {"memory", "1000000", 1000000},
+                {"memory", "1e6x", NAN}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        static setting_texts kept;
+        gbt_train_def def = gbt_train_def_default();
+        const gbt_train_setting *s = setting_find(rows[i].name);
+        assert_non_null(s);
+        const bool is_read = setting_read(s, rows[i].text, &kept, &def);
+        char text[SETTING_TEXT_SIZE] = "";
+        setting_text(s, &def, text, sizeof text);
+        if (is_read == (bool)isnan(rows[i].wanted) ||
+            (is_read && fabs(strtod(text, NULL) - rows[i].wanted) > 0))
+            fail_msg("%s = %s: read as %s", rows[i].name, rows[i].text, is_read ? text : "nothing");
+    }
+}
+
 static void settings_out_of_range_are_named(void **state)
 {
     (void)state;
@@ -1457,18 +1492,32 @@ static void steps_keep_to_their_pixels(void **state)
     trainer_free(&t);
 }
 
+static double downscale_to(const scene *s, double width)
+{
+    double downscale = 0;
+    assert_ok(photos_downscale_to(s, width, &downscale, NULL));
+    return downscale;
+}
+
+static double usual_downscale(const scene *s, bool limits_width)
+{
+    double downscale = 0;
+    assert_ok(photos_usual_downscale(s, limits_width, &downscale, NULL));
+    return downscale;
+}
+
 static void wide_photos_get_a_usual_width(void **state)
 {
     (void)state;
     scene_view views[3] = {
         {.camera = {.width = 800}}, {.camera = {.width = 4000}}, {.camera = {.width = 3200}}};
     scene s = {.views = views, .view_count = 3};
-    assert_true(photos_usual_downscale(&s, true) == 2 && photos_usual_downscale(&s, false) == 1);
-    assert_true(photos_downscale_to(&s, 2400) == 3200.0 / 2400 && photos_downscale_to(&s, 4000) == 1);
+    assert_true(usual_downscale(&s, true) == 2 && usual_downscale(&s, false) == 1);
+    assert_true(downscale_to(&s, 2400) == 3200.0 / 2400 && downscale_to(&s, 4000) == 1);
     views[1].camera.width = 1600;
-    assert_true(photos_usual_downscale(&s, true) == 1);
+    assert_true(usual_downscale(&s, true) == 1);
     views[2].camera.width = 100;
-    assert_true(photos_usual_downscale(&s, true) == 1);
+    assert_true(usual_downscale(&s, true) == 1);
     image photo; /* of a smaller copy, whose cameras say the size of the originals */
     assert_ok(image_alloc(&photo, 20, 15, 3, NULL));
     for (int i = 0; i < 3; i++) {
@@ -1477,11 +1526,11 @@ static void wide_photos_get_a_usual_width(void **state)
     }
     assert_ok(image_write(views[0].path, &photo, NULL));
     image_free(&photo);
-    assert_true(photos_usual_downscale(&s, true) == 5 && photos_usual_downscale(&s, false) == 5);
+    assert_true(usual_downscale(&s, true) == 5 && usual_downscale(&s, false) == 5);
     photo_check check;
     photo_check_all(&s, &check);
     assert_int_equal(unlink(views[0].path), 0);
-    assert_true(photos_usual_downscale(&s, true) == 5); /* headers are read once */
+    assert_true(usual_downscale(&s, true) == 5); /* headers are read once */
     trainer t;
     const gbt_train_def def = run_def();
     open_ok(&t, tiny, &def);
@@ -1614,6 +1663,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(pace_is_read),
         cmocka_unit_test(levels_and_rates),
         cmocka_unit_test(settings_are_whole),
+        cmocka_unit_test(whole_numbers_are_whole),
         cmocka_unit_test(settings_out_of_range_are_named),
         cmocka_unit_test(config_comes_back),
         cmocka_unit_test(a_config_ends_with_its_buffer),

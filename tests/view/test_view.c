@@ -438,6 +438,24 @@ static void newer_models_are_shown(void **state)
     free(live);
 }
 
+/* Of 3DGS: its newest iteration, and the photos of its data set. */
+static void a_result_folder_is_shown(void **state)
+{
+    (void)state;
+    const char *folder = in_root("result/");
+    gbt_export_def baked = gbt_export_def_default();
+    baked.refine_steps = 0;
+    assert_ok(gbt_export(run_folder, &baked, &folder, 1, NULL, NULL));
+    viewer v;
+    const int port = open_viewer(&v, in_root("result"));
+    json_t *there = get_json(port, "/scene");
+    assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0);
+    assert_true(json_array_size(json_object_get(there, "views")) > 0);
+    json_decref(there);
+    free(get_ok(port, "/render?view=0").text);
+    close_viewer(&v, SIGINT);
+}
+
 static void plain_gaussians_are_shown(void **state)
 {
     (void)state;
@@ -530,6 +548,7 @@ int main(void)
         cmocka_unit_test(every_format_and_output),
         cmocka_unit_test(points_lie_behind_their_pixels),
         cmocka_unit_test(newer_models_are_shown),
+        cmocka_unit_test(a_result_folder_is_shown),
         cmocka_unit_test(plain_gaussians_are_shown),
         cmocka_unit_test(what_cannot_be_shown),
         cmocka_unit_test(a_model_without_its_photos),

@@ -289,14 +289,14 @@ static gbt_status measure_run(bench_scene *s, const char *folder, cross_model *o
     const size_t all = held_out > 0 ? held_out : run->scene.view_count,
                  wanted = all < CROSS_VIEWS_MAX ? all : CROSS_VIEWS_MAX;
     for (size_t i = 0; i < run->scene.view_count && out->view_count < wanted; i++) {
-        char name[200];
+        char name[FILE_NAME_SIZE];
         if (held_out > 0 && !run->scene.views[i].is_test)
             continue;
         if (seen++ * wanted / all < out->view_count)
             continue;
         const gbt_camera camera = photos_camera(&run->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
-        loaded_run_view_name(&run->scene.views[i], name, sizeof name);
+        loaded_run_view_name(run, i, name);
         GBT_TRY(measure_shot(s, &shot, name, folder, out, err));
     }
     return GBT_OK;

@@ -40,10 +40,11 @@ static json_t *from_scores(const evaluation *e)
                                         "; LPIPS 0.1 of colours in [-1, 1], lpips_01 in [0, 1]"));
     for (size_t i = 0; i < e->view_count; i++) {
         const view_score *v = &e->views[i];
-        json_t *view = json_pack("{s:o,s:o,s:o,s:o,s:o,s:f,s:I}", "name", json_text(v->name), "psnr",
-                                 json_number(v->psnr), "psnr_fitted", json_number(v->psnr_fitted), "ssim",
-                                 json_number(v->ssim), "flip", json_number(v->flip), "seconds", v->seconds,
-                                 "gaussians", (json_int_t)v->gaussians);
+        json_t *view =
+            json_pack("{s:o,s:o,s:o,s:o,s:o,s:o,s:f,s:I}", "name", json_text(v->name), "picture",
+                      json_text(v->file), "psnr", json_number(v->psnr), "psnr_fitted",
+                      json_number(v->psnr_fitted), "ssim", json_number(v->ssim), "flip", json_number(v->flip),
+                      "seconds", v->seconds, "gaussians", (json_int_t)v->gaussians);
         if (e->lpips_network != NULL)
             add_lpips(view, &v->lpips);
         json_array_append_new(views, view);

@@ -24,6 +24,7 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     score->seconds = clock_wall() - start;
     score->gaussians = r->frame.gaussians.count;
     snprintf(score->name, sizeof score->name, "%s", view->name);
+    loaded_run_view_name(r, index, score->file);
     image photo = {0}, error_map = {0};
     image *render = &r->frame.rgb;
     unsigned char *marks = NULL;

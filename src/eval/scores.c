@@ -6,19 +6,17 @@
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "run/loaded_run.h"
 
 gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err)
 {
-    char name[1024], file[1100];
-    loaded_run_file_name(score->name, name, sizeof name);
+    char file[FILE_NAME_SIZE + 16];
     const struct {
         const char *suffix;
         char *path;
     } outputs[] = {
         {".png", score->render_path}, {".photo.png", score->photo_path}, {".flip.png", score->error_path}};
     for (int i = 0; i < 3; i++) {
-        snprintf(file, sizeof file, "%s%s", name, outputs[i].suffix);
+        snprintf(file, sizeof file, "%s%s", score->file, outputs[i].suffix);
         GBT_TRY(file_join(outputs[i].path, VIEW_PATH_SIZE, folder, file, err));
     }
     return GBT_OK;

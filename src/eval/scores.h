@@ -9,11 +9,13 @@
 #include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 #include "image/metrics.h"
+#include "run/loaded_run.h"
 
 enum { VIEW_PATH_SIZE = 4096 };
 
 typedef struct view_score {
     char name[1024];
+    char file[FILE_NAME_SIZE]; /* of its pictures, without what tells them apart (loaded_run_view_name()) */
     double psnr, ssim, flip;
     double psnr_fitted; /* image_psnr_fitted() */
     double seconds;     /* decode, tree and trace of this view */
@@ -38,8 +40,8 @@ typedef struct evaluation {
     bool exposure;         /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 
-/** Where the pictures of score->name are: FOLDER/NAME.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a
-    path is too long. */
+/** Where its pictures are: FOLDER/FILE.png, .photo.png, .flip.png. GBT_ERR_ARGUMENT when a path is too long.
+ */
 gbt_status view_score_paths(view_score *score, const char *folder, gbt_error *err);
 
 #endif

@@ -144,8 +144,8 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
         const scene_view *view = &r->scene.views[i];
         if (!is_wanted(view, def->split) || !is_own(st, index++))
             continue;
-        char name[1024];
-        loaded_run_view_name(view, name, sizeof name);
+        char name[FILE_NAME_SIZE];
+        loaded_run_view_name(r, i, name);
         const gbt_camera camera = photos_camera(&r->photos, i, 0);
         const ray_shot shot = ray_shot_of(&camera);
         const trace_settings of_run = r->settings;

@@ -41,6 +41,11 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
         if (name == NULL)
             continue;
         snprintf(v->name, sizeof v->name, "%s", name);
+        const char *picture = metrics_text(view, "picture");
+        if (picture != NULL && strchr(picture, '/') == NULL)
+            snprintf(v->file, sizeof v->file, "%s", picture);
+        else /* as older versions wrote it */
+            loaded_run_file_name(name, v->file);
         v->psnr = metrics_number(view, "psnr");
         v->ssim = metrics_number(view, "ssim");
         v->flip = metrics_number(view, "flip");

@@ -288,45 +288,57 @@ gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_er
     return GBT_OK;
 }
 
-void loaded_run_view_name(const scene_view *view, char *out, size_t size)
-{
-    loaded_run_file_name(view->name, out, size);
-}
-
 /* Files are named after views, and then have more behind the name: ".transmittance.exr", and while they are
    written ".tmp". 255 bytes are what file systems take. */
 enum { FILE_NAME_MAX = 200, FILE_NAME_KEPT = 180 };
 
-/* A long name ends by a hash of all of it. */
-static void shorten(const char *name, char *out, size_t size)
+/* A hash of all of the name behind what there is room for. */
+static void add_hash(const char *name, char out[FILE_NAME_SIZE])
 {
-    size_t kept = FILE_NAME_KEPT;
+    size_t kept = strlen(out);
     const uint64_t hash = hash_bytes(HASH_START, name, strlen(name));
+    if (kept > FILE_NAME_KEPT)
+        kept = FILE_NAME_KEPT;
     while (kept > 0 && ((unsigned char)out[kept] & 0xc0) == 0x80) /* never within a letter of UTF-8 */
         kept--;
-    snprintf(out + kept, size - kept, "-%016llx", (unsigned long long)hash);
+    snprintf(out + kept, FILE_NAME_SIZE - kept, "-%016llx", (unsigned long long)hash);
 }
 
 /* The dot before the ending of a photo. Of "1623.25", a time, ".25" is none. */
-static char *ending_of(char *name)
+static const char *ending_of(const char *name)
 {
     static const char *const endings[] = {".png", ".jpg", ".jpeg", ".exr"};
-    char *dot = strrchr(name, '.');
+    const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot != NULL && dot != name && i < sizeof endings / sizeof *endings; i++)
         if (strcasecmp(dot, endings[i]) == 0)
             return dot;
     return NULL;
 }
 
-void loaded_run_file_name(const char *name, char *out, size_t size)
+void loaded_run_file_name(const char *name, char out[FILE_NAME_SIZE])
 {
-    snprintf(out, size, "%s", name);
-    char *ending = ending_of(out);
-    if (ending != NULL)
-        *ending = '\0';
+    const char *ending = ending_of(name);
+    const size_t length = ending != NULL ? (size_t)(ending - name) : strlen(name);
+    snprintf(out, FILE_NAME_SIZE, "%.*s", length < FILE_NAME_SIZE ? (int)length : FILE_NAME_SIZE - 1, name);
     for (char *c = out; *c != '\0'; c++)
         if (*c == '/')
             *c = '_';
-    if (strlen(out) > FILE_NAME_MAX)
-        shorten(name, out, size);
+    if (length > FILE_NAME_MAX)
+        add_hash(name, out);
+}
+
+void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_SIZE])
+{
+    const char *name = r->scene.views[view].name;
+    loaded_run_file_name(name, out);
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        char other[FILE_NAME_SIZE];
+        if (i == view)
+            continue;
+        loaded_run_file_name(r->scene.views[i].name, other);
+        if (strcmp(other, out) != 0)
+            continue;
+        add_hash(name, out);
+        return;
+    }
 }

@@ -83,9 +83,13 @@ gbt_status loaded_run_render(loaded_run *r, size_t view, gbt_error *err);
 /** Settings by a preset. GBT_OK, or GBT_ERR_ARGUMENT ("preset: ...") for what is none. */
 gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_error *err);
 
-/** "a/b.jpg" becomes "a_b": a file name for what belongs to a view, of 200 bytes at most. `size`: above 200.
- */
-void loaded_run_view_name(const scene_view *view, char *out, size_t size);
-void loaded_run_file_name(const char *view_name, char *out, size_t size);
+enum { FILE_NAME_SIZE = 256 };
+
+/** "a/b.jpg" becomes "a_b": a file name for what belongs to a view, of 200 bytes at most. */
+void loaded_run_file_name(const char *view_name, char out[FILE_NAME_SIZE]);
+
+/** The same for an open view; where another view's is the same ("a.png" and "a.jpg"), with a hash of the
+   whole name behind it. Cost: goes over all views. */
+void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_SIZE]);
 
 #endif

@@ -48,20 +48,34 @@ static void pictures_are_named_after_views(void **state)
                                            {"1623.25", "1623.25"},
                                            {"1623.25.png", "1623.25"},
                                            {".png", ".png"}};
-    char got[256], other[256], name[3000];
+    char got[FILE_NAME_SIZE], other[FILE_NAME_SIZE], name[3000];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        loaded_run_file_name(names[i][0], got, sizeof got);
+        loaded_run_file_name(names[i][0], got);
         assert_string_equal(got, names[i][1]);
     }
     /* A long name, of letters of two bytes behind one of one, stays below what file systems take. */
     name[0] = 'a';
     for (size_t i = 1; i + 2 < sizeof name; i += 2)
         memcpy(name + i, "\xc3\xa4", 3);
-    loaded_run_file_name(name, got, sizeof got);
+    loaded_run_file_name(name, got);
     assert_true(strlen(got) == 179 + 17 && got[179] == '-');
     name[sizeof name - 4] = '\0';
-    loaded_run_file_name(name, other, sizeof other);
+    loaded_run_file_name(name, other);
     assert_string_not_equal(got, other);
+    /* Two views never share one. */
+    scene_view views[] = {
+        {.name = "a.png"}, {.name = "a.jpg"}, {.name = "b/c"}, {.name = "b_c.png"}, {.name = "d.png"}};
+    const loaded_run run = {.scene = {.views = views, .view_count = 5}};
+    static const char *const starts[] = {"a-", "a-", "b_c-", "b_c-", "d"};
+    for (size_t i = 0; i < 5; i++) {
+        loaded_run_view_name(&run, i, got);
+        assert_int_equal(strncmp(got, starts[i], strlen(starts[i])), 0);
+        for (size_t k = 0; k < i; k++) {
+            loaded_run_view_name(&run, k, other);
+            assert_string_not_equal(got, other);
+        }
+    }
+    assert_string_equal(got, "d");
 }
 
 static void alpha_is_left_out(void **state)

@@ -5,7 +5,7 @@
 #     python3 bench/renderers.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1500] [--seeds 0,1,2] [--downscale 1]
 #
 # Four runs per scene and seed: traced, N iterations; splatted, N iterations; splatted for as long as the traced run took; and, for as long,
-# the default, which splats first and then traces. A run that is already in DIR is not repeated. Each model is scored as it was trained, and
+# splats for the first 70 % and then rays. A run that is already in DIR is not repeated. Each model is scored as it was trained, and
 # drawn by the other renderer too.
 import argparse
 import json

@@ -68,7 +68,7 @@ typedef enum gbt_renderer {
 /** Cut-offs of rays and responses (docs/accuracy.md). */
 typedef enum gbt_preset {
     GBT_PRESET_EXACT,   /* leaves out alpha < 1e-5: an error of at most that per hit left out, and 1e-4 */
-    GBT_PRESET_DEFAULT, /* that of training */
+    GBT_PRESET_DEFAULT, /* that of the scores, and of the last steps of training */
     GBT_PRESET_FAST,
     GBT_PRESET_AS_TRAINED /* nothing is changed */
 } gbt_preset;

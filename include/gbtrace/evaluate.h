@@ -42,7 +42,7 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  *
  * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED: scores and report are as before.
  *
- * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 
@@ -100,8 +100,9 @@ typedef struct gbt_render_def {
     double downscale;          /* 0: as in training. Default 0 */
     const char *camera;        /* camera file (docs/cameras.md): render that and no views; the data set is not
                                   needed. Default NULL */
-    const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". Always by the
-                            tracer, without meshes. Default NULL */
+    const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". Traced, of the
+                            Gaussians without meshes: refused with another renderer, that of a run trained
+                            with splats, too. Default NULL */
     gbt_preset preset;   /* default GBT_PRESET_AS_TRAINED */
     const char *insert;  /* meshes to put into the scene (docs/inserting.md); traced only.
                             Default NULL */

@@ -32,8 +32,8 @@ typedef struct gbt_model gbt_model;
 /**
  * Open a trained model or a file of plain Gaussians.
  *
- * @param path [in]  RUN (a folder with model.gbt), a model file, or plain Gaussians in any format of
- *                   gbt_export_format_at(). The data set is not needed
+ * @param path [in]  RUN (a folder with model.gbt), a model file, plain Gaussians in any format of
+ *                   gbt_export_format_at(), or a result folder of 3DGS. The data set is not needed
  * @param out  [out] free with gbt_model_close(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -119,10 +119,11 @@ typedef struct gbt_model_view {
 /**
  * Read the cameras of the data set that a model was trained on, or of another of the same place.
  *
- * @param data  [in]  data set folder; NULL: the one that the model names, seen from the present folder
+ * @param data  [in]  data set folder; NULL: the one that the model names, seen from the present folder; of a
+ *                    result folder of 3DGS that of its cfg_args, or its cameras.json
  * @param count [out] how many views there are; 0 on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians, and `data` is NULL), GBT_ERR_IO (it is not there),
- *         GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (Gaussians that know no cameras, and `data` is NULL), GBT_ERR_IO (it is
+ * not there), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_model_open_views(gbt_model *model, const char *data, size_t *count, gbt_error *err);
 

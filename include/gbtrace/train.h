@@ -85,9 +85,9 @@ typedef struct gbt_train_def {
                       as it is. With `resume`, true makes it so from now on */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
                                                     stops meanwhile */
-    int eval_at_count;
-    const char *command; /* the command line, for the report. Default "" */
-    uint32_t cookie_;    /* set by gbt_train_def_default() */
+    int eval_at_count;                           /* [0, GBT_TRAIN_MAX_EVALS]; times rise */
+    const char *command;                         /* the command line, for the report. Default "" */
+    uint32_t cookie_;                            /* set by gbt_train_def_default() */
 } gbt_train_def;
 
 gbt_train_def gbt_train_def_default(void);

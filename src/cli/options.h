@@ -86,7 +86,7 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err);
 #define PRESET_OPTION(place)                                                                                 \
     {                                                                                                        \
         .name = "preset", .kind = OPTION_CHOICE, .value = (place), .choices = GBT_PRESET_NAMES,              \
-        .help = "cut-off preset (docs/accuracy.md); training uses default"                                   \
+        .help = "cut-off preset (docs/accuracy.md); scores use default"                                      \
     }
 #define DOWNSCALE_OPTION(place)                                                                              \
     {                                                                                                        \

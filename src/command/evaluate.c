@@ -55,6 +55,8 @@ static void log_scores(const evaluation *e)
 static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
                            gbt_error *err)
 {
+    if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
+        return base_fail(err, GBT_ERR_ARGUMENT, "downscale: %g (wanted 1 to 64)", def->downscale);
     GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
     GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
     const gbt_renderer trained = r->frame.draw.renderer;
@@ -62,10 +64,10 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
         GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
         r->frame.draw.renderer = def->renderer;
     }
-    const char *data = r->model.data_folder;
+    const char *data = r->data.place; /* where its own is now; empty: nowhere */
     *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
            (def->preset == GBT_PRESET_AS_TRAINED || def->preset == GBT_PRESET_DEFAULT) &&
-           (def->data == NULL || data[0] == '\0' || !file_exists(data) || file_is_same(def->data, data));
+           (def->data == NULL || data[0] == '\0' || file_is_same(def->data, data));
     return GBT_OK;
 }
 

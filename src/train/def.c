@@ -28,6 +28,13 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
         GBT_TRY(setting_check(gbt_train_setting_at(i), d, err));
     if ((d->views & (d->views - 1)) != 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "views: %d (wanted a power of two)", d->views);
+    if (d->eval_at_count < 0 || d->eval_at_count > GBT_TRAIN_MAX_EVALS)
+        return base_fail(err, GBT_ERR_ARGUMENT, "eval_at_count: %d (wanted 0 to %d)", d->eval_at_count,
+                         GBT_TRAIN_MAX_EVALS);
+    for (int i = 1; i < d->eval_at_count; i++)
+        if (!(d->eval_at_seconds[i] > d->eval_at_seconds[i - 1]))
+            return base_fail(err, GBT_ERR_ARGUMENT, "eval_at: %g s after %g s (wanted rising times)",
+                             d->eval_at_seconds[i], d->eval_at_seconds[i - 1]);
     if (d->resume && d->overwrite)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "overwrite: would lose the run that resume goes on with (wanted one of them)");

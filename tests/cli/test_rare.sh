@@ -46,6 +46,10 @@ printf '0001.png\n0005.png\n' >names.txt && "$program" train made -o listed --it
     mkdir apart && (cd apart && "$program" eval ../listed) >out 2>>err && grep -q '^2 held-out views: ' err && "$program" train --config listed/config -o again --quiet >>out 2>>err &&
     cmp again/held-out.txt listed/held-out.txt >>err && cat listed/report.html | grep -q ' --eval-split list=names.txt'
 report $? "a list of held-out photos stays with the run" "$(cat err out; cat listed/config)"
+"$program" make-scene courtyard -o foreign --width 32 --height 24 --views 9 --samples 1 --points 60 --quiet >out 2>&1 && cp listed/metrics.json before.json && mkdir -p apart &&
+    (cd apart && "$program" eval ../listed --data ../foreign) >out 2>err && cmp listed/metrics.json before.json >>err
+report $? "scores of other data leave the run's alone, from any folder" "$(cat err out)"
+holds "scores at more than the photos' size" 2 '^error: --downscale: 0.5 (wanted 1 to 64)$' eval run --downscale 0.5
 
 # ---- pictures
 "$program" render run -o shown --format exr >out 2>err && "$program" render run -o exact --renderer reference --format exr >>out 2>>err &&

@@ -40,7 +40,7 @@ def main():
             camera = json.dumps({"origin": [3 * math.cos(angle), 3 * math.sin(angle), 1], "target": [0, 0, 0], "up": [0, 0, 1], "fov_x_deg": 50,
                                  "width": 160 + pictures % 7 * 40, "height": 120 + pictures % 5 * 40})
             shape = "camera=" + urllib.parse.quote(camera) if pictures % 3 else f"view={pictures % 2}"
-            query = f"{shape}&format={('raw', 'jpeg', 'png')[pictures % 3]}&sample={pictures % 4}"
+            query = f"{shape}&format={('raw', 'jpeg', 'png')[pictures // 3 % 3]}&sample={pictures % 4}"
             if pictures % 10 == 9:
                 with socket.create_connection((host, port)) as left:
                     left.sendall(f"GET /render?{query} HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n".encode())

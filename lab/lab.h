@@ -221,7 +221,7 @@ lab_anchors_def lab_anchors_def_default(void);
  * Writes anchors.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
  *
  * @return as lab_study_paper()
- * Cost: seven runs per scene and seed. What else runs meanwhile changes nothing but the time.
+ * Cost: eight runs per scene and seed. What else runs meanwhile changes nothing but the time.
  */
 gbt_status lab_study_anchors(const lab_anchors_def *def, const char *folder, FILE *out, gbt_error *err);
 

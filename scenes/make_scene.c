@@ -317,6 +317,17 @@ done:
     return status;
 }
 
+/* Readers take COLMAP's cameras where there are some, and a rolling shutter is not in them. */
+static gbt_status check_other_cameras(const gbt_make_scene_def *def, const char *folder, gbt_error *err)
+{
+    char path[PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, folder, "sparse", err));
+    return def->lens != GBT_MAKE_SCENE_ROLLING || !file_exists(path)
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT,
+                           "%s: is there, with cameras that stand still (wanted another folder)", path);
+}
+
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err)
 {
     const recipe *r = NULL;
@@ -326,6 +337,7 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
     GBT_TRY(def_check(def->cookie_, "gbt_make_scene_def_default", err));
     GBT_TRY(find_recipe(def->name, &r, err));
     GBT_TRY(check_def(def, err));
+    GBT_TRY(check_other_cameras(def, folder, err));
     /* Before any work: an unwritable folder should fail at once. */
     GBT_TRY(make_folder(folder, "images", err));
     if (def->depth)

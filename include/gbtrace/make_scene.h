@@ -55,7 +55,7 @@ const char *gbt_make_scene_summary(const char *name);
  * ray through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
  * nothing is hit; with def->gaussians, gaussians.ply: plain Gaussians of degree 3, 248 bytes each, spread
  * evenly over the surfaces in the colours that are seen from in front. Existing files of these names are
- * replaced, others stay.
+ * replaced, others stay; rolling shutters are refused where a folder sparse is.
  *
  * Every sparse point lies on a surface that at least three views really see, moved by Gaussian noise; its
  * observations are the projections of the true point with 0.3 px of noise. One point in a hundred is an

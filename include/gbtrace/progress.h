@@ -40,5 +40,14 @@ typedef void (*gbt_listener)(const gbt_event *event, void *context);
  */
 void gbt_listen(gbt_listener to, void *context);
 
+/**
+ * Text for a command that is shown to be copied: as it is where a POSIX shell takes it for one word, else in
+ * single quotes.
+ *
+ * @param size [in] of `out`, at least 1; what does not fit is cut off
+ * @return `out`
+ */
+const char *gbt_shell_word(const char *text, char *out, size_t size);
+
 GBT_API_END
 #endif

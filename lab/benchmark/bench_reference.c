@@ -76,13 +76,15 @@ void bench_reference_free(bench_reference *reference)
 static void add_error(bench_error *sum, double error)
 {
     sum->psnr += error * error; /* a sum of squares, until bench_error_of() */
-    sum->max = fmax(sum->max, fabs(error));
+    sum->max = fabs(error) > sum->max || isnan(error) ? fabs(error) : sum->max; /* NaN stays */
 }
 
 bench_error bench_error_of(double square_sum, double max, size_t values)
 {
-    return (bench_error){.psnr = square_sum > 0 ? fmin(-10 * log10(square_sum / (double)values), 200) : 200,
-                         .max = max};
+    const double psnr = square_sum > 0      ? fmin(-10 * log10(square_sum / (double)values), 200)
+                        : isnan(square_sum) ? square_sum
+                                            : 200;
+    return (bench_error){.psnr = psnr, .max = max};
 }
 
 bench_error bench_reference_compare(const bench_reference *reference, const image *rgb)

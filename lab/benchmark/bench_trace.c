@@ -155,10 +155,10 @@ static json_t *way_to_json(const measured *m, size_t way)
         if (rows[r].key != NULL)
             json_object_set_new(out, rows[r].key, json_real(rows[r].value));
     if (m->def->check) {
-        json_object_set_new(out, "psnr_to_reference", json_real(m->error[way].psnr));
-        json_object_set_new(out, "max_error", json_real(m->error[way].max));
-        json_object_set_new(out, "psnr_without_cuts", json_real(m->whole[way].psnr));
-        json_object_set_new(out, "max_error_without_cuts", json_real(m->whole[way].max));
+        json_object_set_new(out, "psnr_to_reference", json_number(m->error[way].psnr));
+        json_object_set_new(out, "max_error", json_number(m->error[way].max));
+        json_object_set_new(out, "psnr_without_cuts", json_number(m->whole[way].psnr));
+        json_object_set_new(out, "max_error_without_cuts", json_number(m->whole[way].max));
     }
     return out;
 }

@@ -170,17 +170,18 @@ void draw_random_direction(uint64_t seed, uint64_t stream, uint64_t i, double di
 
 /* ---- comparing ---- */
 
-/* NaN when one of the two is. */
-static double larger(double most, double difference)
+double draw_larger(double most, double difference)
 {
     return difference > most || isnan(difference) ? difference : most;
 }
+
+double draw_smaller(double least, double value) { return value < least || isnan(value) ? value : least; }
 
 double draw_difference(const float *a, const float *b, size_t count)
 {
     double most = 0;
     for (size_t i = 0; i < count; i++)
-        most = larger(most, fabs((double)a[i] - (double)b[i]));
+        most = draw_larger(most, fabs((double)a[i] - (double)b[i]));
     return most;
 }
 
@@ -188,7 +189,7 @@ double draw_error(const float *a, const double *exact, size_t count)
 {
     double most = 0;
     for (size_t i = 0; i < count; i++)
-        most = larger(most, fabs((double)a[i] - exact[i]));
+        most = draw_larger(most, fabs((double)a[i] - exact[i]));
     return most;
 }
 

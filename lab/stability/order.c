@@ -32,9 +32,10 @@ static void compare_stack(const drawing *d, size_t pixel, double alpha, size_t n
     stack_exact(alpha, n, stop, &T, &red, &blue);
     const float *rgb = d->rgb.pixels + 3 * pixel;
     const double off = fabs((double)d->transmittance[pixel] - T);
-    out->absolute = fmax(out->absolute, off);
-    out->relative = fmax(out->relative, off / T);
-    out->color = fmax(out->color, fmax(fabs((double)rgb[0] - red), fabs((double)rgb[2] - blue)));
+    out->absolute = draw_larger(out->absolute, off);
+    out->relative = draw_larger(out->relative, off / T);
+    out->color =
+        draw_larger(out->color, draw_larger(fabs((double)rgb[0] - red), fabs((double)rgb[2] - blue)));
 }
 
 static void stack_up(stability *s, size_t n, double alpha, double depth, gaussians *g)
@@ -120,7 +121,7 @@ static size_t bits_changed(const stability *s, const drawing d[2], const bool *o
         if (on_edge[i / 3])
             continue;
         changed += memcmp(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], sizeof(float)) != 0;
-        *most = fmax(*most, draw_difference(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], 1));
+        *most = draw_larger(*most, draw_difference(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], 1));
     }
     return changed;
 }
@@ -224,7 +225,7 @@ gbt_status stability_a6(stability *s)
         d = (drawing){.traced.kernel = kernels[k]};
         draw_traced(s, &d, &g, &settings, &rays);
         if (s->status == GBT_OK)
-            worst = fmax(worst, draw_error(d.rgb.pixels, exact, 3 * 64));
+            worst = draw_larger(worst, draw_error(d.rgb.pixels, exact, 3 * 64));
     }
     stability_check(s, "A6a", worst, NAN, "%zu on every ray; the worst of four kernels.", count);
     drawing_free(&d);
@@ -242,7 +243,7 @@ gbt_status stability_a6(stability *s)
     draw_traced(s, &d, &g, &settings, &rays);
     double shown = 0;
     for (size_t i = 0; i < 3 * 64 && s->status == GBT_OK; i++)
-        shown = fmax(shown, fabs((double)d.rgb.pixels[i] - (double)settings.background[i % 3]));
+        shown = draw_larger(shown, fabs((double)d.rgb.pixels[i] - (double)settings.background[i % 3]));
     stability_check(s, "A6b", shown, NAN, "%s", "");
     mem_free(exact);
     drawing_free(&d);

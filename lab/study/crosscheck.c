@@ -94,7 +94,7 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
             max = fmax(max, off);
         }
         bool in_band = false;
-        if (max > 1e-5)
+        if (!(square <= 1e-10 && max <= 1e-5)) /* NaN, too */
             status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i,
                                         &scratch, &in_band);
         left_out += in_band;

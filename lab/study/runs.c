@@ -17,6 +17,7 @@
 #include "base/memory.h"
 #include "data/json_fields.h"
 #include "data/json_out.h"
+#include "eval/lpips.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 #include "run/loaded_run.h"
@@ -226,15 +227,15 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 
-static gbt_status score(const char *run, const char *lpips, gbt_error *err)
+static gbt_status score(const char *run, const char *network, gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
     evaluate.report = 0;
-    evaluate.lpips = lpips;
+    evaluate.lpips = network;
     return gbt_evaluate(run, &evaluate, err);
 }
 
-static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *lpips,
+static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *network,
                            const char *study_path, const char *settings, gbt_error *err)
 {
     const gbt_compress_def compress = gbt_compress_def_default();
@@ -245,13 +246,31 @@ static gbt_status make_run(const char *data, const char *run, const gbt_train_de
     GBT_TRY(train(data, run, def, err));
     GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* scored is the file that `gbtrace train` leaves
                                                              */
-    GBT_TRY(score(run, lpips, err));
+    GBT_TRY(score(run, network, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
     return save_measured(study_path, settings, &measured, err);
 }
 
-gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *lpips,
+/* Whether a run has the scores of this kind of network; of none (NULL) always. */
+static gbt_status is_scored_by(const char *file, const char *metrics_path, bool *scored, gbt_error *err)
+{
+    lpips *net = NULL;
+    json_t *metrics = NULL;
+    *scored = file == NULL;
+    if (file == NULL)
+        return GBT_OK;
+    gbt_status status = lpips_open(file, &net, err);
+    if (status == GBT_OK)
+        status = json_read(metrics_path, &metrics, err);
+    const char *theirs = json_string_value(json_object_get(metrics, "lpips_network"));
+    *scored = status == GBT_OK && theirs != NULL && strcmp(theirs, lpips_network(net)) == 0;
+    json_decref(metrics);
+    lpips_close(net);
+    return status;
+}
+
+gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def *def, const char *network,
                          study_figures *out, gbt_error *err)
 {
     char study_path[PATH_SIZE], metrics_path[PATH_SIZE], settings[SETTINGS_SIZE];
@@ -260,12 +279,14 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     settings_text(data, def, settings, sizeof settings);
     if (read_run(study_path, metrics_path, settings, out)) {
         log_info("%s: there already", run);
-        if (lpips == NULL || isfinite(out->lpips_01))
+        bool scored;
+        GBT_TRY(is_scored_by(network, metrics_path, &scored, err));
+        if (scored)
             return GBT_OK;
-        GBT_TRY(score(run, lpips, err));
+        GBT_TRY(score(run, network, err));
     } else {
         log_info("%s", run);
-        GBT_TRY(make_run(data, run, def, lpips, study_path, settings, err));
+        GBT_TRY(make_run(data, run, def, network, study_path, settings, err));
     }
     return read_run(study_path, metrics_path, settings, out)
                ? GBT_OK

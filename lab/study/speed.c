@@ -12,9 +12,11 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/sky.h"
 #include "benchmark/bench_scene.h"
 #include "lab/lab.h"
 #include "study/model.h"
+#include "raster/raster.h"
 #include "trace/reference.h"
 
 /* ---- what is tried ---- */
@@ -60,12 +62,23 @@ static const speed_step steps[] = {
     {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
 
-static void list_rows(const trace_settings *own, speed_model *out)
+/* Splats are drawn by still pinholes alone: of the photos that are compared, too. */
+static bool takes_splats(const bench_scene *s)
+{
+    bool takes = raster_takes(&s->camera.shot.camera);
+    for (size_t i = 0; s->run != NULL && i < s->run->scene.view_count; i++)
+        takes = takes && raster_takes(&s->run->scene.views[i].camera);
+    return takes;
+}
+
+static void list_rows(const trace_settings *own, bool with_splats, speed_model *out)
 {
     const cpu_isa best = cpu_best_isa();
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
         const speed_step *s = &steps[i];
         if (s->knob == KNOB_ISA && (s->choice > (int)best || !cpu_has_isa((cpu_isa)s->choice)))
+            continue;
+        if (s->knob == KNOB_RENDERER && !with_splats)
             continue;
         speed_row *row = &out->rows[out->row_count++];
         *row = (speed_row){
@@ -132,10 +145,10 @@ static int by_centre(const void *a, const void *b)
     return p->hit->id < q->hit->id ? -1 : p->hit->id > q->hit->id;
 }
 
-static void blend_by_centre(const order_job *job, const reference_hit *hits, size_t count, centre_hit *order,
-                            double rgb[3])
+static void blend_by_centre(const order_job *job, const double dir[3], const reference_hit *hits,
+                            size_t count, centre_hit *order, double rgb[3])
 {
-    double T = 1;
+    double T = 1, behind[3];
     for (size_t i = 0; i < count; i++) {
         order[i] = (centre_hit){0, &hits[i]};
         for (unsigned k = 0; k < 3; k++)
@@ -151,8 +164,9 @@ static void blend_by_centre(const order_job *job, const reference_hit *hits, siz
             rgb[c] += T * alpha * field_of(job->scene, REFERENCE_red + c, order[i].hit->id);
         T = next;
     }
+    sky_color_exact(&job->settings->sky, job->settings->background, dir, behind);
     for (int c = 0; c < 3; c++)
-        rgb[c] += T * (double)job->settings->background[c];
+        rgb[c] += T * behind[c];
 }
 
 static void order_block(size_t block, size_t begin, size_t end, void *context)
@@ -175,7 +189,7 @@ static void order_block(size_t block, size_t begin, size_t end, void *context)
             status = mem_reserve((void **)&order, &order_capacity, 0, count + 1, sizeof *order,
                                  "hits by centre", NULL);
         if (status == GBT_OK)
-            blend_by_centre(job, hits, count, order, job->rgb + 3 * i);
+            blend_by_centre(job, dir, hits, count, order, job->rgb + 3 * i);
     }
     mem_free(hits);
     mem_free(order);
@@ -304,7 +318,7 @@ static gbt_status measure_scene(bench_scene *s, bench_reference *want, const cha
 {
     GBT_TRY(bench_scene_open(path, camera, s, err));
     trace_settings whole = s->settings;
-    list_rows(&whole, out);
+    list_rows(&whole, takes_splats(s), out);
     whole.alpha_min = 1e-6f;
     whole.transmittance_min = 1e-9f;
     whole.proxy_radius = INFINITY;

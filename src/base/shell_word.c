@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* base/shell_word.c -- text in single quotes; a quote in it stands outside of them: 'it'\''s'. */
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 
 #include <stdio.h>
 #include <string.h>
 
-const char *shell_word(const char *text, char *out, size_t size)
+const char *gbt_shell_word(const char *text, char *out, size_t size)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./:=@%+,-";
     if (text[0] != '\0' && text[strspn(text, plain)] == '\0') {

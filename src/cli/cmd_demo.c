@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/progress.h"
@@ -67,8 +67,9 @@ static int run(const operands *given)
         return command_misused("--output: the path is too long");
     char data_word[sizeof data], run_word[sizeof run_folder];
     snprintf(command_line, sizeof command_line, "gbtrace train %s -o %s --budget %.0fs --seed %llu",
-             shell_word(data, data_word, sizeof data_word), shell_word(run_folder, run_word, sizeof run_word),
-             60 * minutes, (unsigned long long)train.seed);
+             gbt_shell_word(data, data_word, sizeof data_word),
+             gbt_shell_word(run_folder, run_word, sizeof run_word), 60 * minutes,
+             (unsigned long long)train.seed);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = true;

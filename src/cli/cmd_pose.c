@@ -2,7 +2,7 @@
 /* cli/cmd_pose.c -- gbtrace pose. */
 #include <stdio.h>
 
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "cli/options.h"
 #include "gbtrace/pose.h"
 
@@ -49,7 +49,7 @@ static int run(const operands *given)
     gbt_error err = {0};
     const gbt_status status = gbt_pose(given->value[0], &def, out, stdout, &err);
     if (status == GBT_OK)
-        printf("Train: gbtrace train %s -o RUN\n", shell_word(out, word, sizeof word));
+        printf("Train: gbtrace train %s -o RUN\n", gbt_shell_word(out, word, sizeof word));
     return command_failed(status, &err);
 }
 

@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "cli/command.h"
 #include "cli/progress.h"
 #include "gbtrace/compress.h"
@@ -28,5 +28,6 @@ void finish_run_say(const char *run)
 {
     char word[8192];
     if (progress_for_people())
-        printf("Report: %s/report.html\nViewer: gbtrace view %s\n", run, shell_word(run, word, sizeof word));
+        printf("Report: %s/report.html\nViewer: gbtrace view %s\n", run,
+               gbt_shell_word(run, word, sizeof word));
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/train_options.c -- the options of a training run: the library's settings, and what people type who come
    from other programs. */
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "cli/train_options.h"
 
 #include <stdio.h>
@@ -167,7 +167,7 @@ gbt_status train_options_finish(gbt_train_def *def, const char *eval_at, const o
     size_t used = (size_t)snprintf(command_line, sizeof command_line, "gbtrace train");
     for (int i = 0; i < given->argc && used < sizeof command_line; i++)
         used += (size_t)snprintf(command_line + used, sizeof command_line - used, " %s",
-                                 shell_word(given->argv[i], word, sizeof word));
+                                 gbt_shell_word(given->argv[i], word, sizeof word));
     def->command = command_line;
     return eval_at != NULL ? read_times(eval_at, def, err) : GBT_OK;
 }

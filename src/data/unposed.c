@@ -8,7 +8,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 
 enum { PATH_SIZE = 4096 };
 
@@ -69,5 +69,5 @@ gbt_status unposed_check(const char *path, gbt_error *err)
     char word[PATH_SIZE];
     return base_fail(err, GBT_ERR_FORMAT,
                      "%s: %s without camera poses (find them with: gbtrace pose %s -o DATA)", path,
-                     film ? "a film" : "photos", shell_word(path, word, sizeof word));
+                     film ? "a film" : "photos", gbt_shell_word(path, word, sizeof word));
 }

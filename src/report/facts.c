@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "gbtrace/version.h"
 #include "report/metrics.h"
 #include "report/rows.h"
@@ -134,7 +134,7 @@ void report_again(text *out, const char *run, const json_t *metrics)
     char config[4096], word[8192];
     snprintf(config, sizeof config, "%s/config", run);
     text_add(out, "gbtrace train --config ");
-    text_escaped(out, shell_word(config, word, sizeof word));
+    text_escaped(out, gbt_shell_word(config, word, sizeof word));
     text_add(out, " -o NEW");
     const size_t before = out->length;
     text_add(out, " --pace ");
@@ -146,7 +146,7 @@ void report_again(text *out, const char *run, const json_t *metrics)
                       "schedules of the former length, and this makes another model.</p>\n");
     text_add(out, "<p>The scores, the pictures and this page, from the model (<code>gbtrace "
                   "report</code> makes the page alone):</p>\n<pre class=\"card\">gbtrace eval ");
-    text_escaped(out, shell_word(run, word, sizeof word));
+    text_escaped(out, gbt_shell_word(run, word, sizeof word));
     text_add(
         out,
         "</pre>\n<p>Pictures here are JPEG for size; the scores were made from the PNG files in "

@@ -20,7 +20,7 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/rng.h"
-#include "base/shell_word.h"
+#include "gbtrace/progress.h"
 #include "base/vec.h"
 #include "test_support.h"
 
@@ -698,7 +698,7 @@ static void a_shell_takes_a_text_for_one_word(void **state)
                                         "\\"};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
         char word[256], command[300], got[256];
-        snprintf(command, sizeof command, "printf '%%s' %s", shell_word(texts[i], word, sizeof word));
+        snprintf(command, sizeof command, "printf '%%s' %s", gbt_shell_word(texts[i], word, sizeof word));
         FILE *shell = popen(command, "r");
         assert_non_null(shell);
         got[fread(got, 1, sizeof got - 1, shell)] = '\0';
@@ -706,8 +706,8 @@ static void a_shell_takes_a_text_for_one_word(void **state)
         assert_string_equal(got, texts[i]);
     }
     char small[4];
-    assert_string_equal(shell_word("run", small, sizeof small), "run");
-    assert_string_equal(shell_word("a run", small, sizeof small), "'a ");
+    assert_string_equal(gbt_shell_word("run", small, sizeof small), "run");
+    assert_string_equal(gbt_shell_word("a run", small, sizeof small), "'a ");
 }
 
 int main(void)

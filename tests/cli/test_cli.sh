@@ -385,6 +385,7 @@ misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time 
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace or query; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
+misuse 2 "made/sparse: is there, with cameras that stand still (wanted another folder)" make-scene tabletop -o made --lens rolling
 misuse 2 "--points: bad value (wanted a whole number from 10000 to 10000000, got 10)" bench query --points 10
 misuse 2 "--json: not of bench query (of trace)" bench query --points 10000 --json figures.json
 misuse 2 "--output: not of bench trace (of query)" bench trace --model gaussians.ply -o figures

@@ -16,21 +16,23 @@ failed=0 done=0 refused=0
     { cat said; exit 1; }
 mapfile -t files < <(find run data -type f | LC_ALL=C sort)
 
-number() { # below $1
-    echo $(((RANDOM << 15 | RANDOM) % $1))
+number() { # sets n, below $1. Not in a subshell, which would have random numbers of its own
+    n=$(((RANDOM << 15 | RANDOM) % $1))
 }
 
-edit() { # file: prints what was done
-    local size at other
+edit() { # file: sets `did`
+    local size at
     size=$(stat -c %s "$1")
-    at=$(number $((size + 1)))
-    case $(number 6) in
-    0) echo "a byte at $at"; printf "\\x$(printf %x "$(number 256)")" | dd of="$1" bs=1 seek="$at" conv=notrunc status=none ;;
-    1) echo "64 bytes at $at"; head -c $((64 * (1 + at))) <(yes "$RANDOM") | tail -c 64 | dd of="$1" bs=1 seek="$at" conv=notrunc status=none ;;
-    2) echo "cut at $at"; truncate -s "$at" "$1" ;;
-    3) echo "1000 bytes more"; head -c 1000 /dev/zero >>"$1" ;;
-    4) other=${files[$(number ${#files[@]})]}; echo "$other in its place"; cp "$other" "$1" ;;
-    5) echo "gone"; rm "$1" ;;
+    number $((size + 1))
+    at=$n
+    number 6
+    case $n in
+    0) did="a byte at $at"; number 256; printf "\\x$(printf %x "$n")" | dd of="$1" bs=1 seek="$at" conv=notrunc status=none ;;
+    1) did="64 bytes at $at"; n=$RANDOM; head -c $((64 * (1 + at))) <(yes "$n") | tail -c 64 | dd of="$1" bs=1 seek="$at" conv=notrunc status=none ;;
+    2) did="cut at $at"; truncate -s "$at" "$1" ;;
+    3) did="1000 bytes more"; head -c 1000 /dev/zero >>"$1" ;;
+    4) number ${#files[@]}; did="${files[n]} in its place"; cp "${files[n]}" "$1" ;;
+    5) did="gone"; rm "$1" ;;
     esac
 }
 
@@ -52,8 +54,10 @@ mkdir kept && mv run data kept
 for ((i = 0; i < count; i++)); do
     rm -rf run data drawn
     cp -R kept/. .
-    file=${files[$(number ${#files[@]})]}
-    what="$file: $(edit "$file")"
+    number ${#files[@]}
+    file=${files[n]}
+    edit "$file"
+    what="$file: $did"
     check "$what" info run
     check "$what" render run -o drawn --quiet
     check "$what" report run

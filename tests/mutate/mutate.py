@@ -175,12 +175,15 @@ def main():
     if a.chosen:
         every = tests_in(["*"])
         work = [(m, [t for t in every if t[0] in m[4]]) for m in chosen(a.files)]
+        for m, tests in work:
+            if len(tests) != len(m[4]):
+                sys.exit("mutate: chosen.txt: %s: no such tests: %s" % (m[0], " ".join(sorted(set(m[4]) - {t[0] for t in tests}))))
     else:
         names = a.files or sorted(subprocess.run(["git", "ls-files", "src/*.c", "src/*.h"], cwd=top, capture_output=True, text=True, check=True).stdout.split())
         every = [m for name in names for m in mutants_of(name)]
         random.Random(a.seed).shuffle(every)
         work = [(m, tests_for(m[0].split("/")[1])) for m in every[a.begin:]]
-    killed = survived = 0
+    killed = survived = broken = 0
     for m, tests in work:
         if not a.chosen and killed + survived == a.count:
             break
@@ -194,15 +197,17 @@ def main():
         tests = unchanged(tests, float("inf") if a.chosen else slow_seconds)
         if not tests:
             print("no tests  %s" % m[0], flush=True)
+            broken += a.chosen
             continue
         by = judge(m[0], text, tests)
         if by == "the compiler":
             print("no build  %s:%d: %s" % (m[0], m[1], m[3].strip()), flush=True)
+            broken += a.chosen
             continue
         killed, survived = killed + (by is not None), survived + (by is None)
         print("%s  %s:%d: %s -> %s%s" % ("killed  " if by else "SURVIVED", m[0], m[1], m[2].strip(), m[3].strip(), "  (%s)" % by if by else ""), flush=True)
     print("%d mutants, %d killed, %d survived" % (killed + survived, killed, survived))
-    return survived > 0
+    return survived + broken > 0
 
 
 if __name__ == "__main__":

@@ -61,6 +61,9 @@ static void ways_in_turn(void **state)
     const bench_error off = bench_reference_compare(&want, &ways[0].rgb);
     assert_near(off.max, 0.5, 1e-4);
     assert_near(off.psnr, -10 * log10(0.25 / 72), 0.01);
+    ways[0].rgb.pixels[3 * (8 * 48 + 16) + 1] = NAN; /* no picture is right that holds one */
+    const bench_error none = bench_reference_compare(&want, &ways[0].rgb);
+    assert_true(isnan(none.max) && isnan(none.psnr));
     double half[3 * 12];
     for (int i = 0; i < 36; i++)
         half[i] = want.rgb[6 * (i / 3) + i % 3];

@@ -69,6 +69,13 @@ static inline void grad_fields_of(const gaussians *g, const float *fields[GAUSSI
 #undef X
 }
 
+/** As the run was trained. */
+static inline double grad_volume_weight(const grad_checker *c)
+{
+    const train_rules rules = train_rules_of(&c->run->def);
+    return loss_volume_weight(&rules, &c->run->model.decoder);
+}
+
 /** A small picture of a view, with the tape for its adjoint. */
 gbt_status grad_render_at(grad_checker *c, size_t view, int width, gbt_error *err);
 

@@ -64,7 +64,7 @@ gbt_status grad_check_decode(grad_checker *c, gbt_error *err)
     frame *f = c->frame;
     GBT_TRY(grad_render_at(c, c->view, c->width, err)); /* a kept pass has one adjoint */
     GBT_TRY(frame_backward_gaussians(f, &c->d_image, err));
-    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    loss_add_gradient(&f->gaussians, grad_volume_weight(c), &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_anchors,
                                    c->d_params, err));
     const float *d_fields[GAUSSIANS_FIELD_COUNT];
@@ -141,11 +141,12 @@ static gbt_status chain_loss(grad_checker *c, reference_scene *seen, int which, 
 {
     const frame *f = c->frame;
     parallel_blocks(f->visible_count, ANCHOR_GRAIN, decode_block, c);
+    const double volume_weight = grad_volume_weight(c);
     double shares = 0;
     size_t to = 0;
     for (size_t i = 0; i < f->gaussians.count; i++) {
         double *slot = c->slots + f->tape.slot[i] * (size_t)DECODE_REF_FIELDS;
-        shares += loss_of_gaussian(slot);
+        shares += loss_of_gaussian(slot, volume_weight);
         if (!(c->weight[i] > 0))
             continue;
         frame_widen_exact(f, i, slot);

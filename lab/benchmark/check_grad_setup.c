@@ -67,7 +67,7 @@ gbt_status grad_set_up(grad_checker *c, gbt_error *err)
     GBT_TRY(loss_of_image(&c->frame->rgb, &c->photo, c->valid, &c->scratch, &c->d_image, &loss, err));
     fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n",
             s->views[view].name, c->width, c->height, c->scene.count, c->frame->visible_count,
-            loss.loss + loss_of_gaussians(&c->frame->gaussians));
+            loss.loss + loss_of_gaussians(&c->frame->gaussians, grad_volume_weight(c)));
     fprintf(c->out, "%-12s%-12s%12s%12s\n", "stage", "class", "error", "limit");
     return GBT_OK;
 }

@@ -50,7 +50,7 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
     return GBT_OK;
 }
 
-static const double spacing_min = 3.1622776601683794e-4; /* sqrt(1e-7) */
+static const double baseline_spacing_min = 3.1622776601683794e-4; /* sqrt(1e-7) */
 
 /* The cap wins over floor and factor. */
 static double first_scale(double scale, double floor_scale, double factor, double most)
@@ -64,14 +64,14 @@ static void set_scale(anchors *a, size_t i, double scale)
         a->scale_log[i * 6 + c] = (float)log(scale);
 }
 
-gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most,
-                                      float *out, gbt_error *err)
+gbt_status anchor_scales_from_spacing(const float *position, size_t count, double least, double factor,
+                                      double most, float *out, gbt_error *err)
 {
     point_tree *tree = NULL;
     GBT_TRY(point_tree_build(number_floats(position), (number_array){0}, count, &tree, err));
     const gbt_status status = point_tree_spacing(tree, number_floats(position), 3, out, err);
     for (size_t i = 0; i < count && status == GBT_OK; i++)
-        out[i] = (float)first_scale((double)out[i], spacing_min, factor, most);
+        out[i] = (float)first_scale((double)out[i], least, factor, most);
     point_tree_free(tree);
     return status;
 }
@@ -79,15 +79,18 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
 /* The baseline. A lone anchor has no spacing and takes the voxel size. */
 static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
 {
-    const double factor = (double)def->scale_factor, most = (double)def->scale_max;
+    const double factor = (double)def->scale_factor, most = (double)def->scale_max,
+                 least = def->kind == GBT_INIT_VOXEL ? baseline_spacing_min
+                                                     : ANCHOR_SPACING_LEAST(def->balls.voxel_size);
     if (a->count == 1) {
-        set_scale(a, 0, first_scale((double)def->balls.voxel_size, spacing_min, factor, most));
+        set_scale(a, 0, first_scale((double)def->balls.voxel_size, least, factor, most));
         return GBT_OK;
     }
     float *scale = mem_alloc(a->count, sizeof *scale, "anchors", err);
     if (scale == NULL)
         return GBT_ERR_NO_MEMORY;
-    const gbt_status status = anchor_scales_from_spacing(a->position, a->count, factor, most, scale, err);
+    const gbt_status status =
+        anchor_scales_from_spacing(a->position, a->count, least, factor, most, scale, err);
     for (size_t i = 0; i < a->count && status == GBT_OK; i++)
         set_scale(a, i, (double)scale[i]);
     mem_free(scale);

@@ -55,12 +55,17 @@ gbt_status anchors_init(const float *position, const float *color, size_t count,
  * so the floor.
  *
  * @param position [in]  [count][3], finite
+ * @param least    [in]  of the spacing, > 0
  * @param factor   [in]  > 0; `most` wins over it
  * @param out      [out] [count], > 0
  * @return GBT_OK, GBT_ERR_NO_MEMORY
  * Cost: one tree and one query each.
  */
-gbt_status anchor_scales_from_spacing(const float *position, size_t count, double factor, double most,
-                                      float *out, gbt_error *err);
+gbt_status anchor_scales_from_spacing(const float *position, size_t count, double least, double factor,
+                                      double most, float *out, gbt_error *err);
+
+/** The least spacing, which also stands for points in one place: a part of the voxel size, so that no unit of
+    length is meant. The baseline has sqrt(1e-7) of the data's own. */
+#define ANCHOR_SPACING_LEAST(voxel_size) ((double)(voxel_size) / 64)
 
 #endif

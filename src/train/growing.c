@@ -87,7 +87,8 @@ static gbt_status find_points(const trainer *t, known_points *known, growth_poin
         known->scale = mem_alloc(points->count, sizeof *known->scale, "growth", err);
         if (known->scale == NULL)
             return GBT_ERR_NO_MEMORY;
-        GBT_TRY(anchor_scales_from_spacing(points->position, points->count, TRAIN_SPACING_SCALE,
+        GBT_TRY(anchor_scales_from_spacing(points->position, points->count,
+                                           ANCHOR_SPACING_LEAST(t->voxel_size), TRAIN_SPACING_SCALE,
                                            t->first_scale_max, known->scale, err));
     }
     if (t->anchors.count == 0)

@@ -7,7 +7,8 @@
 
 #include "base/parallel.h"
 
-static const float dssim_weight = (float)IMAGE_DSSIM_WEIGHT, volume_weight = 0.01f;
+static const float dssim_weight = (float)IMAGE_DSSIM_WEIGHT;
+static const double volume_weight_at_6 = 0.01; /* in scenes whose cameras are 6 units from what they see */
 
 /* ---- of the picture ---- */
 
@@ -27,9 +28,18 @@ double loss_of_value(double shown, double photo, double ssim)
 
 enum { GAUSSIAN_BLOCK = 4096, GAUSSIAN_BLOCKS = 64 };
 
+double loss_volume_weight(const train_rules *rules, const decoder *d)
+{
+    if (!rules->distance_by_median)
+        return volume_weight_at_6;
+    const double unit = 6 * (double)d->distance_scale;
+    return volume_weight_at_6 * (unit * unit * unit);
+}
+
 typedef struct volume_job {
     const gaussians *g;
     gaussians *d;
+    double weight;
     double sum[GAUSSIAN_BLOCKS]; /* added in their order */
 } volume_job;
 
@@ -43,7 +53,7 @@ static void sum_volumes(size_t block, size_t begin, size_t end, void *context)
     job->sum[block] = volume;
 }
 
-double loss_of_gaussians(const gaussians *g)
+double loss_of_gaussians(const gaussians *g, double volume_weight)
 {
     volume_job job = {.g = g};
     const size_t share = parallel_block_count(g->count, GAUSSIAN_BLOCKS),
@@ -52,7 +62,7 @@ double loss_of_gaussians(const gaussians *g)
     double volume = 0;
     for (size_t i = 0; i < parallel_block_count(g->count, grain); i++)
         volume += job.sum[i];
-    return g->count > 0 ? (double)volume_weight * (volume / (double)g->count) : 0;
+    return g->count > 0 ? volume_weight * (volume / (double)g->count) : 0;
 }
 
 static void add_volume_gradient(size_t block, size_t begin, size_t end, void *context)
@@ -61,7 +71,7 @@ static void add_volume_gradient(size_t block, size_t begin, size_t end, void *co
     const volume_job *job = context;
     const gaussians *g = job->g;
     gaussians *d = job->d;
-    const float share = volume_weight / (float)g->count;
+    const float share = (float)(job->weight / (double)g->count);
     for (size_t i = begin; i < end; i++) {
         d->scale_x[i] += share * g->scale_y[i] * g->scale_z[i];
         d->scale_y[i] += share * g->scale_x[i] * g->scale_z[i];
@@ -69,14 +79,14 @@ static void add_volume_gradient(size_t block, size_t begin, size_t end, void *co
     }
 }
 
-void loss_add_gradient(const gaussians *g, gaussians *d)
+void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d)
 {
-    volume_job job = {.g = g, .d = d};
+    volume_job job = {.g = g, .d = d, .weight = volume_weight};
     parallel_blocks(g->count, GAUSSIAN_BLOCK, add_volume_gradient, &job);
 }
 
-double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT])
+double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT], double volume_weight)
 {
     enum { SCALE = 3 }; /* of the fields: means come first */
-    return (double)volume_weight * (field[SCALE] * field[SCALE + 1] * field[SCALE + 2]);
+    return volume_weight * (field[SCALE] * field[SCALE + 1] * field[SCALE + 2]);
 }

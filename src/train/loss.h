@@ -4,8 +4,10 @@
 #ifndef GBT_TRAIN_LOSS_H
 #define GBT_TRAIN_LOSS_H
 
+#include "anchor/anchors.h"
 #include "base/gaussians.h"
 #include "image/metrics.h"
+#include "train/rules.h"
 
 /**
  * The picture's terms: (1 - w) L1 + w (1 - SSIM), w = IMAGE_DSSIM_WEIGHT.
@@ -18,14 +20,19 @@ gbt_status loss_of_image(const image *shown, const image *photo, const unsigned 
 /** One value's share of the picture's terms before the mean, for checks in double. */
 double loss_of_value(double shown, double photo, double ssim);
 
-/** The Gaussians' terms: 0.01 times their mean volume (the product of the scales); 0 without Gaussians. */
-double loss_of_gaussians(const gaussians *g);
+/** What the mean volume of Gaussians (the product of the scales) counts in the loss: 0.01, with lengths in
+   sixths of the median distance between cameras and anchors, so that a scene is trained alike whatever its
+   unit of length; the reference takes that unit. */
+double loss_volume_weight(const train_rules *rules, const decoder *d);
+
+/** The Gaussians' terms: their mean volume times that weight; 0 without Gaussians. */
+double loss_of_gaussians(const gaussians *g, double volume_weight);
 
 /** Adds the gradient of loss_of_gaussians() to `d`. */
-void loss_add_gradient(const gaussians *g, gaussians *d);
+void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d);
 
 /** One Gaussian's share of loss_of_gaussians() before the mean, for checks in double. `field`: in the order
    of GAUSSIANS_FIELDS. */
-double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT]);
+double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT], double volume_weight);
 
 #endif

@@ -262,8 +262,9 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
 
     stage_clock clock = stage_begin();
     image_loss_result loss;
+    const double volume_weight = loss_volume_weight(&t->rules, &t->decoder);
     GBT_TRY(compare(t, v, &loss, err));
-    r->loss = loss.loss + loss_of_gaussians(&f->gaussians);
+    r->loss = loss.loss + loss_of_gaussians(&f->gaussians, volume_weight);
     r->l1 = loss.l1;
     r->ssim = loss.ssim;
     r->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
@@ -283,7 +284,7 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
         GBT_TRY(frame_backward_sky(f, &v->d_image, r->d_sky, err));
     if (t->poses.count > 0)
         GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
-    loss_add_gradient(&f->gaussians, &f->d_gaussians);
+    loss_add_gradient(&f->gaussians, volume_weight, &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &t->anchors, &t->decoder, &gradient->anchors, gradient->networks, err));
     char where[80];
     if (gradient_is_bad(gradient, f, &t->decoder, t->exposures.count > 0 ? r->d_exposure : NULL, where,

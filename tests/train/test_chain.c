@@ -346,12 +346,13 @@ static void float_chain_agrees_with_double(void **state)
         image_loss_result loss;
         assert_ok(image_alloc(&d_image, WIDTH, HEIGHT, 3, NULL));
         assert_ok(loss_of_image(&v.f.rgb, &v.photo, NULL, &scratch, &d_image, &loss, NULL));
-        worst_loss = fmax(worst_loss, fabs(loss.loss + loss_of_gaussians(&v.f.gaussians) - loss_of(&v)));
+        worst_loss = fmax(worst_loss,
+                          fabs(loss.loss + loss_of_gaussians(&v.f.gaussians, volume_weight) - loss_of(&v)));
         anchors d_anchors = {.offset_count = OFFSETS};
         assert_ok(anchors_resize(&d_anchors, v.a.count, NULL));
         float *d_params = mem_calloc(v.d.param_count, sizeof *d_params, "test", NULL);
         assert_ok(frame_backward_gaussians(&v.f, &d_image, NULL));
-        loss_add_gradient(&v.f.gaussians, &v.f.d_gaussians);
+        loss_add_gradient(&v.f.gaussians, volume_weight, &v.f.d_gaussians);
         assert_ok(frame_backward_anchors(&v.f, &v.a, &v.d, &d_anchors, d_params, NULL));
         for (int class = 0; class < CLASS_COUNT; class ++) {
             decoder_part parts[3];
@@ -397,7 +398,7 @@ static void threads_give_the_same_bits(void **state)
         assert_ok(anchors_resize(&d_anchors, v.a.count, NULL));
         float *d_params = mem_calloc(v.d.param_count, sizeof *d_params, "test", NULL);
         assert_ok(frame_backward_gaussians(&v.f, &v.photo, NULL));
-        loss_add_gradient(&v.f.gaussians, &v.f.d_gaussians);
+        loss_add_gradient(&v.f.gaussians, volume_weight, &v.f.d_gaussians);
         assert_ok(frame_backward_anchors(&v.f, &v.a, &v.d, &d_anchors, d_params, NULL));
         uint64_t h = hash_bytes(1, v.f.rgb.pixels, 3 * RAYS * sizeof(float));
         h = hash_bytes(h, d_anchors.feature, v.a.count * ANCHOR_FEATURE_DIM * sizeof(float));

@@ -629,6 +629,53 @@ static void points_that_tell_nothing_are_replaced(void **state)
     }
 }
 
+/* ---- units ---- */
+
+/* Metres or millimetres: a scene in another unit of length is learned as well. */
+static void the_unit_of_length_does_not_matter(void **state)
+{
+    (void)state;
+    static const double units[] = {1, 1024, 1.0 / 1024};
+    double losses[3] = {0};
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    for (int i = 0; i < 3; i++) {
+        colmap_image pictures[VIEWS];
+        colmap_point points[200];
+        memset(pictures, 0, sizeof pictures);
+        memset(points, 0, sizeof points);
+        assert_true(s.view_count == VIEWS && s.points.count <= 200);
+        const char *folder = in_root("unit%d", i);
+        assert_ok(file_make_folder(folder, NULL));
+        assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
+        for (size_t v = 0; v < VIEWS; v++) {
+            pictures[v] = (colmap_image){.name = s.views[v].name, .camera = s.views[v].camera};
+            for (int k = 0; k < 3; k++)
+                pictures[v].camera.center[k] *= units[i];
+        }
+        for (size_t p = 0; p < s.points.count; p++)
+            for (size_t k = 0; k < 3; k++) {
+                points[p].position[k] = units[i] * (double)s.points.position[3 * p + k];
+                points[p].color[k] = (unsigned char)(255 * s.points.color[3 * p + k] + 0.5f);
+            }
+        assert_ok(colmap_write(joined(folder, "sparse/0"), pictures, VIEWS, points, s.points.count, NULL));
+        gbt_train_def def = run_def();
+        trainer t;
+        open_ok(&t, folder, &def);
+        for (int step = 0; step < STEPS; step++) {
+            step_report r;
+            step_ok(&t, &r);
+            losses[i] += step >= STEPS / 2 ? r.loss : 0;
+        }
+        trainer_free(&t);
+    }
+    scene_free(&s);
+    print_message("loss in other units: %.4f and %.4f of that in the first\n", losses[1] / losses[0],
+                  losses[2] / losses[0]);
+    assert_true(fabs(losses[1] / losses[0] - 1) < 0.03 && fabs(losses[2] / losses[0] - 1) < 0.03);
+}
+
 /* ---- photos that differ in exposure ---- */
 
 /* Half as bright, so that twice that does not clip. */
@@ -808,6 +855,7 @@ int main(void)
         cmocka_unit_test(nothing_is_nearer_than_photos_show),
         cmocka_unit_test(opacities_are_raised),
         cmocka_unit_test(points_that_tell_nothing_are_replaced),
+        cmocka_unit_test(the_unit_of_length_does_not_matter),
         cmocka_unit_test(wild_rates_and_photos_leave_no_nan),
         cmocka_unit_test(exposures_stay_centred),
         cmocka_unit_test(exposure_is_learned),

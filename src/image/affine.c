@@ -158,12 +158,13 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
                 float m[AFFINE_NUMBERS])
 {
     const double ridge = 1e-6;
-    double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}};
+    double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}}, used = 0;
     for (int y = 0; y < from->height; y++)
         for (int x = begin; x < end; x++) {
             const size_t pixel = (size_t)y * (size_t)from->width + (size_t)x, at = 3 * pixel;
             if (valid != NULL && !valid[pixel])
                 continue;
+            used++;
             const float *p = from->pixels + at, *q = to->pixels + at;
             const double in[INPUTS] = {finite_or_0(p[0]), finite_or_0(p[1]), finite_or_0(p[2]), 1};
             for (int i = 0; i < INPUTS; i++) {
@@ -173,7 +174,7 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
                     b[r][i] += in[i] * finite_or_0(q[r]);
             }
         }
-    const double weight = ridge * fmax(1, (double)from->height * (double)(end - begin));
+    const double weight = ridge * fmax(1, used);
     for (int i = 0; i < INPUTS; i++) {
         a[i][i] += weight;
         if (i < OUTPUTS)

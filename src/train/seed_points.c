@@ -56,14 +56,17 @@ typedef struct seeding {
    scale. */
 static void find_focus(const seed_view *views, size_t count, double focus[3], double *distance)
 {
-    double a[3][4] = {{0}};
+    double a[3][4] = {{0}}, middle[3] = {0};
+    for (size_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++)
+            middle[k] += views[i].camera.center[k] / (double)count;
     for (size_t i = 0; i < count; i++) {
         const double *d = views[i].camera.rotation + 6; /* third row: the optical axis in the world */
         for (int r = 0; r < 3; r++)
             for (int c = 0; c < 3; c++) {
                 const double p = (r == c ? 1 : 0) - d[r] * d[c];
                 a[r][c] += p;
-                a[r][3] += p * views[i].camera.center[c];
+                a[r][3] += p * (views[i].camera.center[c] - middle[c]);
             }
     }
     for (int r = 0; r < 3; r++)
@@ -77,7 +80,7 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
                 a[r][c] -= f * a[k][c];
         }
     for (int k = 0; k < 3; k++)
-        focus[k] = a[k][3] / a[k][k];
+        focus[k] = middle[k] + a[k][3] / a[k][k];
     double sum = 0;
     for (size_t i = 0; i < count; i++) {
         const double d[3] = {focus[0] - views[i].camera.center[0], focus[1] - views[i].camera.center[1],

@@ -157,6 +157,12 @@ static void masked_pixels_are_not_fitted(void **state)
     affine_fit(&from, &to, valid, 0, WIDTH, got);
     for (int k = 0; k < AFFINE_NUMBERS; k++)
         assert_near((double)got[k], (double)m[k], 3e-4);
+    for (int i = 0; i < WIDTH * HEIGHT; i++) /* what is masked does not pull towards the identity either */
+        valid[i] = i % WIDTH < 2;
+    float columns[AFFINE_NUMBERS];
+    affine_fit(&from, &to, valid, 0, WIDTH, got);
+    affine_fit(&from, &to, NULL, 0, 2, columns);
+    assert_memory_equal(got, columns, sizeof got);
     affine_half half;
     assert_ok(affine_split(&from, &to, valid, &half, NULL));
     for (int y = 0; y < HEIGHT; y++)

@@ -126,7 +126,14 @@ static gbt_status add_transforms(const char *path, const char *folder, bool may_
 
 static gbt_status load_transforms(const char *path, const char *folder, raw_scene *raw, gbt_error *err)
 {
+    char masks[PATH_SIZE];
+    bool masked = false;
     GBT_TRY(add_transforms(path, folder, false, raw, err));
+    GBT_TRY(file_join(masks, sizeof masks, folder, "masks", err));
+    for (size_t i = 0; i < raw->view_count; i++)
+        masked = masked || raw->views[i].mask_path != NULL;
+    if (!masked && file_is_folder(masks))
+        log_warn("%s: not used: no frame of %s names a mask in it (mask_path)", masks, path);
     return raw_sort_views(raw, path, err);
 }
 

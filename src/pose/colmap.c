@@ -149,13 +149,12 @@ static void hear_mapping(const char *line, void *context)
 
 /* ---- features ---- */
 
-static const char *model_name(const job *j, char name[CHOICE_TEXT_SIZE])
+/* `photos` are of one camera. */
+static const char *model_name(const job *j, size_t photos, char name[CHOICE_TEXT_SIZE])
 {
     gbt_pose_camera model = j->def.camera_model;
     if (model == GBT_POSE_CAMERA_AUTO)
-        model = j->groups <= JOB_GROUPS_MAX && j->photo_count >= (size_t)OPENCV_LEAST * (size_t)j->groups
-                    ? GBT_POSE_CAMERA_OPENCV
-                    : GBT_POSE_CAMERA_SIMPLE_RADIAL;
+        model = photos >= OPENCV_LEAST ? GBT_POSE_CAMERA_OPENCV : GBT_POSE_CAMERA_SIMPLE_RADIAL;
     return choice_name(GBT_POSE_CAMERA_NAMES, (int)model, name);
 }
 
@@ -214,7 +213,7 @@ static gbt_status extract_group(const job *j, const dialect *d, int group, progr
     begin_command(&c, j, "feature_extractor");
     add(&c, "image_path", j->images);
     add(&c, "image_list_path", list);
-    add(&c, "ImageReader.camera_model", model_name(j, model));
+    add(&c, "ImageReader.camera_model", model_name(j, group >= 0 ? count : 1, model));
     if (group >= 0) {
         uint32_t camera;
         GBT_TRY(camera_of(j, group, &camera, err));
@@ -236,10 +235,12 @@ static gbt_status extract(const job *j, const dialect *d, gbt_error *err)
     GBT_TRY(job_path(j, "features.log", log_path, err));
     unlink(log_path);
     if (j->groups > JOB_GROUPS_MAX)
-        log_info("features: %zu photos, %s, a camera for each", j->photo_count, model_name(j, model));
+        log_info("features: %zu photos, %s, a camera for each", j->photo_count, model_name(j, 1, model));
+    else if (j->groups == 1)
+        log_info("features: %zu photos, %s, 1 camera by size and EXIF", j->photo_count,
+                 model_name(j, j->photo_count, model));
     else
-        log_info("features: %zu photos, %s, %d camera%s by size and EXIF", j->photo_count,
-                 model_name(j, model), j->groups, j->groups == 1 ? "" : "s");
+        log_info("features: %zu photos, %d cameras by size and EXIF", j->photo_count, j->groups);
     progress p = begin("features", j->photo_count);
     if (j->groups > JOB_GROUPS_MAX)
         GBT_TRY(extract_group(j, d, -1, &p, err));

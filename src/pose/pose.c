@@ -79,6 +79,8 @@ static gbt_status set_folders(job *j, const char *source, const char *data, gbt_
             "%s: the photos are in the folder itself (wanted another folder for the data set, or "
             "the photos in %s)",
             data, j->images);
+    if (!j->is_film && j->def.frames != 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames: of a film (%.1000s is a folder of photos)", source);
     return GBT_OK;
 }
 

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/choice.h"
-#include "base/clock.h"
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
@@ -199,27 +198,15 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     return status;
 }
 
-static void say_progress(size_t done, size_t count, double start, double *said)
-{
-    const double now = clock_wall();
-    if (done < count && now - *said < 5)
-        return;
-    log_info("frame %zu of %zu, %.0f s left", done, count,
-             (now - start) / (double)done * (double)(count - done));
-    *said = now;
-}
-
 static gbt_status render_frames(studio *st, const camera_path *path, const char *out,
                                 const gbt_render_def *def, gbt_error *err)
 {
-    const double start = clock_wall();
-    double said = start;
     for (size_t i = 0; i < path->count; i++) {
         char name[32];
         snprintf(name, sizeof name, "frame_%05zu", i + 1);
         if (is_own(st, i))
             GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
-        say_progress(i + 1, path->count, start, &said);
+        log_count("render", i + 1, path->count, (double)NAN);
     }
     return GBT_OK;
 }
@@ -242,8 +229,6 @@ static gbt_status film_rounds(studio *st, const camera_path *path, video *film, 
 {
     const size_t size = st->together ? 1 : (size_t)gbt_cluster_size();
     const size_t rank = st->together ? 0 : (size_t)gbt_cluster_rank();
-    const double start = clock_wall();
-    double said = start;
     for (size_t first = 0; first < path->count; first += size) {
         const size_t count = path->count - first < size ? path->count - first : size;
         gbt_status status = rank < count ? draw(st, &path->shots[first + rank], def, err) : GBT_OK;
@@ -259,7 +244,7 @@ static gbt_status film_rounds(studio *st, const camera_path *path, video *film, 
             status = video_add(film, &picture, err);
         }
         GBT_TRY(cluster_follow(status, err));
-        say_progress(first + count, path->count, start, &said);
+        log_count("render", first + count, path->count, (double)NAN);
     }
     return GBT_OK;
 }

@@ -8,9 +8,10 @@
 #include "train/rules.h"
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
-static const double program_bytes = 150e6, raw_point_bytes = 36 + 24, point_bytes = 24, tree_bytes = 100,
-                    tree_fixed_bytes = 95, learning_point_bytes = 3000, model_point_bytes = 600,
-                    step_pixel_bytes = 300, score_pixel_bytes = 120, kept_pixel_bytes = 3;
+static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
+                    tree_bytes = 100, tree_fixed_bytes = 95, learning_point_bytes = 3000,
+                    model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120,
+                    kept_pixel_bytes = 3;
 static const double found_points = 20000, /* by photo consistency, where the data set has none */
     most_points = 131072;                 /* the tree of balls is 18 deep: more points make no more anchors */
 
@@ -37,7 +38,8 @@ memory_need memory_need_of(const scene *s, double downscale)
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */
         starting = need.points + need.photos + need.trees,
                  stepping = need.points + need.photos + need.anchors + need.view;
-    need.whole = need.program + fmax(scoring, fmax(starting, stepping));
+    need.whole = fmax(need.program + fmax(scoring, fmax(starting, stepping)), least_bytes);
     need.least = fmin(need.whole, 16.0 / 15 * (need.program + fmax(tree_fixed_bytes * points, need.view)));
+    need.least = fmax(need.least, least_bytes);
     return need;
 }

@@ -147,10 +147,10 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
         return GBT_OK;
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MB is too little: %zu points and photos of %d x %d take about %.0f, or %.0f "
+        "memory: %zu MiB is too little: %zu points and photos of %d x %d take about %.0f, or %.0f "
         "without a limit",
         t->def.memory >> 20, t->scene.points.count, t->scene.views[0].camera.width,
-        t->scene.views[0].camera.height, need.least / 0x1p20, need.whole / 0x1p20);
+        t->scene.views[0].camera.height, ceil(need.least / 0x1p20), ceil(need.whole / 0x1p20));
 }
 
 /* Nothing would be learned, and no loss would tell. */

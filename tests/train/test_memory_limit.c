@@ -78,7 +78,7 @@ static void too_little(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.memory = (size_t)60 << 20;
-    train_fails(tiny, in_root("none"), &def, GBT_ERR_NO_MEMORY, "60 MB is too little");
+    train_fails(tiny, in_root("none"), &def, GBT_ERR_NO_MEMORY, "60 MiB is too little");
     assert_false(file_exists(in_root("none/model.gbt")));
 }
 

@@ -206,7 +206,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     if (data == NULL && is_plain(out) && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: plain Gaussians know no cameras (wanted `camera` or `data`)", run);
-    if (data == NULL && out->data.tried[0] == '\0')
+    if (data == NULL && !has_data && out->data.tried[0] == '\0')
         return base_fail(err, GBT_ERR_IO, "%.1000s: the model names no data set; `data` says where it is",
                          run);
     if (data == NULL && !has_data)

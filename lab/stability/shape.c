@@ -154,7 +154,7 @@ gbt_status stability_a2(stability *s)
             measure_ratio(s, n, pancake, ratios[i], count, error);
             for (int r = 0; r < 2; r++) {
                 if (ratios[i] <= promised)
-                    worst[pancake][r] = fmax(worst[pancake][r], error[r]);
+                    worst[pancake][r] = draw_larger(worst[pancake][r], error[r]);
                 if (!pancake)
                     stability_point(chart, r, ratios[i], fmax(error[r], 1e-7));
             }

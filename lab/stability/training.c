@@ -139,8 +139,8 @@ static void look_from_everywhere(stability *s, far_views *f)
             if ((is_near || is_far) && level)
                 lost[is_far] = loss;
             else if (is_near || is_far)
-                elsewhere = fmax(elsewhere, loss);
-            outside_most = fmax(outside_most, outside);
+                elsewhere = draw_larger(elsewhere, loss);
+            outside_most = draw_larger(outside_most, outside);
         }
     /* On an anchor: direction and distance are not defined. */
     gbt_camera on = practice_camera(f->p, 0, 0, own);

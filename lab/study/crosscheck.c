@@ -68,7 +68,7 @@ static bench_error compare(const image *a, const image *b)
     for (size_t i = 0; i < count; i++) {
         const double off = fabs((double)a->pixels[i] - (double)b->pixels[i]);
         sum += off * off;
-        max = fmax(max, off);
+        max = off > max || isnan(off) ? off : max; /* NaN stays */
     }
     return bench_error_of(sum, max, count);
 }
@@ -94,7 +94,7 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
             max = fmax(max, off);
         }
         bool in_band = false;
-        if (!(square <= 1e-10 && max <= 1e-5)) /* NaN, too */
+        if (max > 1e-5 || isnan(square))
             status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i,
                                         &scratch, &in_band);
         left_out += in_band;

@@ -15,8 +15,8 @@
 #include "base/sky.h"
 #include "benchmark/bench_scene.h"
 #include "lab/lab.h"
-#include "study/model.h"
 #include "raster/raster.h"
+#include "study/model.h"
 #include "trace/reference.h"
 
 /* ---- what is tried ---- */

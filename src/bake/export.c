@@ -267,7 +267,9 @@ static gbt_status check_places(const char *input, const char *json, const char *
                 return base_fail(err, GBT_ERR_ARGUMENT,
                                  "%s: would be written twice (each output must be another file)", other);
         }
-    if (json != NULL && file_is_same(json, input))
+    char trained[4096];
+    GBT_TRY(file_join(trained, sizeof trained, input, "model.gbt", err));
+    if (json != NULL && (file_is_same(json, input) || file_is_same(json, trained)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
                          json);
     for (size_t i = 0; i < output_count; i++)

@@ -2,7 +2,6 @@
 /* base/cpu.c -- choose the instruction set of the kernels at run time. */
 #include "base/cpu.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -39,7 +39,4 @@ void cpu_limit_isa(cpu_isa isa);
 
 const char *cpu_isa_name(cpu_isa isa);
 
-/** What the system calls the first processor, "?" where it does not say. */
-void cpu_processor_name(char *out, size_t size);
-
 #endif

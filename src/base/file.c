@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "base/fail.h"
+#include "base/large_file.h"
 #include "base/memory.h"
 #include "base/paged.h"
 
@@ -113,32 +114,6 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
     return status;
 }
 
-static gbt_status write_all(int fd, const unsigned char *bytes, size_t byte_count, const char *path,
-                            gbt_error *err)
-{
-    size_t done = 0;
-    while (done < byte_count) {
-        const ssize_t put = write(fd, bytes + done, byte_count - done);
-        if (put < 0 && errno == EINTR)
-            continue;
-        if (put <= 0)
-            return base_fail(err, GBT_ERR_IO, "%s: write failed: %s", path,
-                             strerror(put < 0 ? errno : ENOSPC));
-        done += (size_t)put;
-    }
-    return GBT_OK;
-}
-
-static gbt_status write_stream(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
-{
-    const int fd = open(path, O_WRONLY | O_APPEND | O_CLOEXEC);
-    if (fd < 0)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
-    const gbt_status status = write_all(fd, bytes, byte_count, path, err);
-    close(fd);
-    return status;
-}
-
 /* Where a path is: of "a/b" and of "a/": "a". */
 static void folder_of(const char *path, char folder[PATH_LIMIT])
 {
@@ -197,30 +172,11 @@ void file_sync_folder_of(const char *path)
 
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
 {
-    if (file_is_stream(path))
-        return write_stream(path, bytes, byte_count, err);
-    char temporary[PATH_LIMIT];
-    const char *slash = strrchr(path, '/');
-    const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
-    if (snprintf(temporary, sizeof temporary, "%.*s.%s.tmp", folder_length, path, path + folder_length) >=
-        (int)sizeof temporary)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
-    const int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (fd < 0)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
-    gbt_status status = write_all(fd, bytes, byte_count, path, err);
-    if (status == GBT_OK && fsync(fd) != 0)
-        status = base_fail(err, GBT_ERR_IO, "%s: fsync failed: %s", path, strerror(errno));
-    if (close(fd) != 0 && status == GBT_OK)
-        status = base_fail(err, GBT_ERR_IO, "%s: close failed: %s", path, strerror(errno));
-    if (status == GBT_OK && rename(temporary, path) != 0)
-        status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", path, strerror(errno));
-    if (status != GBT_OK) {
-        unlink(temporary);
-        return status;
-    }
-    file_sync_folder_of(path);
-    return GBT_OK;
+    large_file file;
+    GBT_TRY(large_file_create(path, &file, err));
+    const gbt_status status = large_file_put(&file, bytes, byte_count, err),
+                     closed = large_file_close(&file, status == GBT_OK, err);
+    return status == GBT_OK ? closed : status;
 }
 
 gbt_status file_make_folder(const char *path, gbt_error *err)

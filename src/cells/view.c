@@ -165,7 +165,7 @@ static gbt_status find_budget(cell_drawer *d, gbt_error *err)
     const size_t pixels = ray_image_count(&d->rays), least = base_bytes + cell_bytes_least + pixel * pixels;
     if (d->memory < least)
         return base_fail(err, GBT_ERR_NO_MEMORY,
-                         "memory: %zu MB is too little for a picture of %d x %d (wanted %zu)",
+                         "memory: %zu MiB is too little for a picture of %d x %d (wanted %zu)",
                          d->memory >> 20, d->rays.width, d->rays.height, (least >> 20) + 1);
     d->budget = d->memory - base_bytes - pixel * pixels;
     if (d->cell_bytes > 0 && d->cell_bytes < d->budget)

@@ -3,11 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "gbtrace/progress.h"
 #include "cli/finish_run.h"
 #include "cli/options.h"
 #include "cli/progress.h"
 #include "gbtrace/make_scene.h"
+#include "gbtrace/progress.h"
 #include "gbtrace/train.h"
 
 /** "tabletop|courtyard|..." */

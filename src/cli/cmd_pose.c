@@ -2,9 +2,9 @@
 /* cli/cmd_pose.c -- gbtrace pose. */
 #include <stdio.h>
 
-#include "gbtrace/progress.h"
 #include "cli/options.h"
 #include "gbtrace/pose.h"
+#include "gbtrace/progress.h"
 
 static gbt_pose_def def;
 static const char *out;

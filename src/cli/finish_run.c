@@ -4,11 +4,11 @@
 
 #include <stdio.h>
 
-#include "gbtrace/progress.h"
 #include "cli/command.h"
 #include "cli/progress.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
+#include "gbtrace/progress.h"
 
 gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
 {

@@ -25,8 +25,7 @@ static int print_help(void)
     puts("\n`gbtrace COMMAND --help` lists the options of one; `gbtrace --version` (-V, -v) prints the "
          "version.\n"
          "Exit codes: 0 done, 1 a check failed, 2 usage, 3 bad input, 4 input or output failed, 5 out of "
-         "memory "
-         "or over a limit, 130 interrupted, 141 who read the output has left.");
+         "memory or over a limit, 130 interrupted, 141 who read the output has left.");
     return 0;
 }
 

@@ -21,7 +21,7 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err)
     if (limit == 0 || getrusage(RUSAGE_SELF, &used) != 0 || (size_t)used.ru_maxrss * 1024 <= limit)
         return GBT_OK;
     err->status = GBT_ERR_NO_MEMORY;
-    snprintf(err->text, sizeof err->text, "memory: %zu MB is too little: this took %ld (all is done)",
+    snprintf(err->text, sizeof err->text, "memory: %zu MiB is too little: this took %ld (all is done)",
              limit >> 20, (used.ru_maxrss >> 10) + 1);
     return err->status;
 }

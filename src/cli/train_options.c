@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/train_options.c -- the options of a training run: the library's settings, and what people type who come
    from other programs. */
-#include "gbtrace/progress.h"
 #include "cli/train_options.h"
 
 #include <stdio.h>
 #include <string.h>
+
+#include "gbtrace/progress.h"
 
 /* Other programs have these. */
 static const option elsewhere[] = {

@@ -55,6 +55,11 @@ static void log_scores(const evaluation *e)
 static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
                            gbt_error *err)
 {
+    char own_model[4096];
+    GBT_TRY(file_join(own_model, sizeof own_model, run, "model.gbt", err));
+    if (def->json != NULL && file_is_same(def->json, own_model))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
+                         def->json);
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
         return base_fail(err, GBT_ERR_ARGUMENT, "downscale: %g (wanted 1 to 64)", def->downscale);
     GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));

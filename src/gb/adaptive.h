@@ -11,7 +11,7 @@ typedef struct adaptive_def {
                          see balls_voxel_size() */
     float color_unit; /* tau: nor do differences of colour below this, > 0. Default 0.1 */
     size_t balls_max; /* cutting ends there, >= 1. No default */
-    float min_scale;  /* gamma, eq 21: radii are at least max(gamma v, 1e-6). Default 0.25 */
+    float min_scale;  /* gamma, eq 21: radii are at least gamma v. Default 0.25 */
 } adaptive_def;
 
 adaptive_def adaptive_def_default(void);

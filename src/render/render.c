@@ -100,7 +100,7 @@ static gbt_status check_memory(const studio *st, const gbt_render_def *def, gbt_
         return GBT_OK;
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MB is too little: this took %zu (all is done; a .ply alone is drawn cell by cell)",
+        "memory: %zu MiB is too little: this took %zu (all is done; a .ply alone is drawn cell by cell)",
         def->memory >> 20, (peak >> 20) + 1);
 }
 
@@ -201,6 +201,7 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
 static gbt_status render_frames(studio *st, const camera_path *path, const char *out,
                                 const gbt_render_def *def, gbt_error *err)
 {
+    log_count("render", 0, path->count, (double)NAN);
     for (size_t i = 0; i < path->count; i++) {
         char name[32];
         snprintf(name, sizeof name, "frame_%05zu", i + 1);
@@ -229,6 +230,7 @@ static gbt_status film_rounds(studio *st, const camera_path *path, video *film, 
 {
     const size_t size = st->together ? 1 : (size_t)gbt_cluster_size();
     const size_t rank = st->together ? 0 : (size_t)gbt_cluster_rank();
+    log_count("render", 0, path->count, (double)NAN);
     for (size_t first = 0; first < path->count; first += size) {
         const size_t count = path->count - first < size ? path->count - first : size;
         gbt_status status = rank < count ? draw(st, &path->shots[first + rank], def, err) : GBT_OK;

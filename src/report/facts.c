@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "base/file.h"
 #include "gbtrace/progress.h"
 #include "gbtrace/version.h"
 #include "report/metrics.h"
@@ -82,7 +83,10 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
         report_number_row(out, "Photos made smaller by a factor of", downscale, 3, "");
     report_text_row(out, "Held-out split", metrics_text(metrics, "eval_split"));
     report_count_row(out, "Held-out views", (double)e->view_count);
-    report_number_row(out, "Seed", metrics_number(metrics, "seed"), 0, "");
+    if (metrics_text(metrics, "seed") != NULL) /* beyond JSON's whole numbers */
+        report_text_row(out, "Seed", metrics_text(metrics, "seed"));
+    else
+        report_number_row(out, "Seed", metrics_number(metrics, "seed"), 0, "");
     report_open_row(out, "Pace: steps in each twentieth");
     if (!add_pace(out, metrics))
         text_add(out, "n/a");
@@ -128,19 +132,22 @@ void report_again(text *out, const char *run, const json_t *metrics)
 {
     const char *command = metrics_text(metrics, "command");
     const bool resumed = command != NULL && strstr(command, " --resume") != NULL;
-    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n<p>A time budget decides only how "
-                  "many steps there are. With the pace that this run recorded, the same photos give the same "
-                  "model, bit for bit, on any number of threads:</p>\n<pre class=\"card\">");
     char config[4096], word[8192];
     snprintf(config, sizeof config, "%s/config", run);
-    text_add(out, "gbtrace train --config ");
-    text_escaped(out, gbt_shell_word(config, word, sizeof word));
-    text_add(out, " -o NEW");
-    const size_t before = out->length;
-    text_add(out, " --pace ");
-    if (!add_pace(out, metrics))
-        out->length = out->status == GBT_OK ? before : out->length;
-    text_add(out, "</pre>\n");
+    text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n");
+    if (file_exists(config)) { /* imported models have none */
+        text_add(out, "<p>A time budget decides only how many steps there are. With the pace that this run "
+                      "recorded, the "
+                      "same photos give the same model, bit for bit, on any number of threads:</p>\n<pre "
+                      "class=\"card\">gbtrace train --config ");
+        text_escaped(out, gbt_shell_word(config, word, sizeof word));
+        text_add(out, " -o NEW");
+        const size_t before = out->length;
+        text_add(out, " --pace ");
+        if (!add_pace(out, metrics))
+            out->length = out->status == GBT_OK ? before : out->length;
+        text_add(out, "</pre>\n");
+    }
     if (resumed)
         text_add(out, "<p>If the run was given another length when it was resumed, its first steps had the "
                       "schedules of the former length, and this makes another model.</p>\n");

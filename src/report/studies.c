@@ -22,6 +22,8 @@ static const struct {
 
 bool report_is_chart(const char *name)
 {
+    const char *slash = strrchr(name, '/');
+    name = slash != NULL ? slash + 1 : name;
     const size_t length = strlen(name);
     return length > 4 && name[0] != '.' && strcmp(name + length - 4, ".svg") == 0;
 }

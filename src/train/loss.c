@@ -71,7 +71,7 @@ static void add_volume_gradient(size_t block, size_t begin, size_t end, void *co
     const volume_job *job = context;
     const gaussians *g = job->g;
     gaussians *d = job->d;
-    const float share = (float)(job->weight / (double)g->count);
+    const float share = (float)job->weight / (float)g->count;
     for (size_t i = begin; i < end; i++) {
         d->scale_x[i] += share * g->scale_y[i] * g->scale_z[i];
         d->scale_y[i] += share * g->scale_x[i] * g->scale_z[i];

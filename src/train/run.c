@@ -177,7 +177,7 @@ static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_err
     GBT_TRY(save_all(t, paths, err));
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
+        "memory: %zu MiB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
         t->def.memory >> 20, t->anchors.count, (peak >> 20) + 1, (unsigned long long)t->step,
         paths->checkpoint);
 }

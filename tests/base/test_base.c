@@ -20,8 +20,8 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/rng.h"
-#include "gbtrace/progress.h"
 #include "base/vec.h"
+#include "gbtrace/progress.h"
 #include "test_support.h"
 
 /* A turn by 90 degrees about z: nothing that follows it in memory counts, and no column or row may be wrong.

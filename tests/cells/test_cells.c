@@ -501,7 +501,7 @@ static void what_cannot_be_drawn(void **state)
     ray_shot shot = ray_shot_of(&camera);
     assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, 1 << 20, &out, &err),
                      GBT_ERR_NO_MEMORY);
-    assert_non_null(strstr(err.text, "memory: 1 MB is too little for a picture of 72 x 56 (wanted "));
+    assert_non_null(strstr(err.text, "memory: 1 MiB is too little for a picture of 72 x 56 (wanted "));
     memset(&err, 0, sizeof err);
     b.drawer.cell_bytes = 340 * 3; /* less than one chunk */
     assert_int_equal(cell_draw(&b.drawer, &b.store, &shot, &b.settings, 0, plenty, &out, &err),

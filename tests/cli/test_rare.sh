@@ -65,7 +65,7 @@ report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat 
 report $? "the reference, and depth beside it, of a model of splats" "$(cat err out; ls splats-exact)"
 printf '{"cameras": [{"origin": [0, 0, -4], "target": [0, 0, 0]}, {"origin": [1, 0, -4], "target": [0, 0, 0]}], "rays": "none.exr"}' >rays.json
 holds "rays beside the cameras of a path" 3 '^error: rays.json: cameras.0..rays: not in a path (wanted a camera)$' render run --path rays.json -o none
-holds "a limit that one picture passes: it is drawn" 5 '^error: memory: 20 MB is too little: this took [0-9]* (all is done' render run -o drawn --memory 20M && [ -s drawn/0000.png ]
+holds "a limit that one picture passes: it is drawn" 5 '^error: memory: 20 MiB is too little: this took [0-9]* (all is done' render run -o drawn --memory 20M && [ -s drawn/0000.png ]
 report $? "and is there" "$(ls drawn)"
 "$program" render run -o path --path orbit --frames 2 --size 20x10 >out 2>err && [ "$(ls path | wc -l)" = 2 ]
 report $? "an orbit of another size" "$(cat err)"
@@ -144,6 +144,10 @@ report $? "compress within a memory limit" "$(cat err out)"
 report $? "query within a memory limit" "$(cat err out)"
 holds "a limit that is passed" 5 '^error: memory: ' query nearest run --at 0,0,0 --memory 1M
 holds "query of a data set" 0 '[0-9]' query nearest made --at 0,0,0 --count 3
+printf '<svg xmlns="http://www.w3.org/2000/svg"/>' >chart.svg && "$program" report run ./chart.svg >out 2>err && grep -q 'class="study card"' run/report.html
+report $? "a chart that is named from here" "$(cat err out)"
+holds "JSON in the place of the model" 2 '^error: run/model.gbt: would be overwritten (--json must be another file)$' eval run --json run/model.gbt
+holds "JSON in the place of the model that is exported" 2 '^error: run/model.gbt: would be overwritten (--json must be another file)$' export run made.ply --json run/model.gbt
 "$program" report run >out 2>err && grep -c 'class="view' run/report.html >>out
 report $? "a report from a run's own scores" "$(cat err)"
 

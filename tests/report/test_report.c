@@ -38,8 +38,8 @@ static int make_folder(void **state)
 static int remove_folder(void **state)
 {
     (void)state;
-    static const char *const names[] = {"log.csv",   "report.html", "render.png",
-                                        "photo.png", "error.png",   "torn.png"};
+    static const char *const names[] = {"config",    "log.csv",   "report.html", "render.png",
+                                        "photo.png", "error.png", "torn.png"};
     char path[VIEW_PATH_SIZE];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         in_folder(path, names[i]);
@@ -276,6 +276,7 @@ static void write_pictures(void)
     write_picture("render.png", 24, 16, 3, 0.25f);
     write_picture("photo.png", 24, 16, 3, 0.75f);
     write_picture("error.png", 24, 16, 1, 0.5f);
+    write_text("config", "");
 }
 
 static char *write_report(const evaluation *e, const json_t *metrics)

@@ -224,7 +224,7 @@ static void more_memory_than_allowed(void **state)
     gbt_error err = {0};
     def.memory = 1 << 20; /* less than it can be: told before any work */
     assert_int_equal(gbt_train(tiny, in_root("limit"), &def, &err), GBT_ERR_NO_MEMORY);
-    assert_non_null(strstr(err.text, "memory: 1 MB is too little: "));
+    assert_non_null(strstr(err.text, "memory: 1 MiB is too little: "));
     assert_false(file_exists(in_root("limit/model.gbt")) ||
                  file_exists(in_root("limit/checkpoints/last.gbt")));
 
@@ -237,7 +237,7 @@ static void more_memory_than_allowed(void **state)
     def.memory = 300 << 20;
     err = (gbt_error){0};
     assert_int_equal(gbt_train(tiny, in_root("limit"), &def, &err), GBT_ERR_NO_MEMORY);
-    if (strstr(err.text, "memory: 300 MB is too little: ") == NULL)
+    if (strstr(err.text, "memory: 300 MiB is too little: ") == NULL)
         fail_msg("%s", err.text);
     assert_non_null(strstr(err.text, "after step 1; saved in "));
     resume_ok(in_root("limit")); /* it was saved, and goes on with more */

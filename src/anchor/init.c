@@ -140,8 +140,8 @@ static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor
                          .def = def,
                          .radius = radius,
                          .squared = squared,
-                         .floor_scale = fmax((double)def->balls.min_scale, BALLS_MIN_SCALE) *
-                                        (double)def->balls.voxel_size};
+                         .floor_scale =
+                             fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
         parallel_blocks(a->count, 1024, prior_block, &job);
     }
     mem_free(index);

@@ -15,7 +15,6 @@
 #include <unistd.h>
 
 #include "base/fail.h"
-#include "base/large_file.h"
 #include "base/memory.h"
 #include "base/paged.h"
 
@@ -168,15 +167,6 @@ void file_sync_folder_of(const char *path)
         fsync(fd); /* some file systems refuse this on folders; the rename itself has already succeeded */
         close(fd);
     }
-}
-
-gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err)
-{
-    large_file file;
-    GBT_TRY(large_file_create(path, &file, err));
-    const gbt_status status = large_file_put(&file, bytes, byte_count, err),
-                     closed = large_file_close(&file, status == GBT_OK, err);
-    return status == GBT_OK ? closed : status;
 }
 
 gbt_status file_make_folder(const char *path, gbt_error *err)

@@ -195,7 +195,7 @@ gbt_status balls_adapt(const float *position, const float *color, size_t count, 
     const size_t found = count > 0 ? cut_best_first(&c, heap, count, most) : 0;
     for (size_t i = 0; i < found; i++)
         leaf_depth[heap[i].begin] = (uint8_t)(heap[i].depth + 1);
-    const double radius_floor = fmax((double)def->min_scale, BALLS_MIN_SCALE) * (double)def->voxel_size;
+    const double radius_floor = fmax((double)def->min_scale, 1e-6) * (double)def->voxel_size;
     status = balls_fill(c.points, leaf_depth, count, color, radius_floor, out, err);
 done:
     mem_free(heap);

@@ -194,7 +194,7 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
     partition p = {.color = color,
                    .radius_compact = (double)def->radius_factor * voxel_size,
                    .radius_tied = KEPT_SPACINGS * voxel_size,
-                   .radius_floor = fmax((double)def->min_scale, BALLS_MIN_SCALE) * voxel_size,
+                   .radius_floor = fmax((double)def->min_scale * voxel_size, 1e-6),
                    .color_std_max = (double)def->color_std_max,
                    .min_points = (size_t)def->min_points,
                    .max_depth = def->max_depth};

@@ -17,11 +17,8 @@ typedef struct balls_def {
     float color_std_max; /* tau_a, eq 23: largest mean channel std-dev of an even set, [0, 1]. Default 0.02 */
     int min_points;      /* N_min, eq 23: sets this small are not split; >= 1. Default 2 */
     int max_depth;       /* D_max, eq 23: [0, 64]; the root has depth 0. Default 18 */
-    float min_scale;     /* gamma, eq 21: s_min = gamma v. Default 0.25 */
+    float min_scale;     /* gamma, eq 21: s_min = max(gamma v, 1e-6). Default 0.25 */
 } balls_def;
-
-/** The least gamma that counts. (The paper has a least s_min, 1e-6, which means a unit of length.) */
-#define BALLS_MIN_SCALE 1e-6
 
 balls_def balls_def_default(void); /* the paper's settings; voxel_size is 0 and must be set */
 

@@ -322,17 +322,22 @@ static void tiny_scales_have_a_floor(void **state)
 {
     (void)state;
     anchor_init_def def =
-        def_with_voxel(1e-9f); /* everything below the floors: eps, and sqrt(1e-7) for neighbours */
+        def_with_voxel(1e-9f); /* everything below the floors: eps, and sqrt(1e-7) of the baseline */
     anchors a;
     const float close[12] = {0, 0, 0, 1e-8f, 0, 0, 2e-8f, 0, 0, 3e-8f, 0, 0};
     for (int nn = 0; nn <= 1; nn++) {
         def.scale = nn == 1 ? GBT_SCALE_PRIOR_NN : GBT_SCALE_PRIOR_GB;
+        def.kind = nn == 1 ? GBT_INIT_VOXEL : GBT_INIT_GB;
         assert_ok(anchors_init(close, NULL, 4, &def, &a, NULL, NULL));
         assert_true(a.count > 1);
         for (size_t i = 0; i < a.count; i++)
             assert_scale(&a, i, nn == 1 ? sqrt(1e-7) : 1e-6);
         anchors_free(&a);
     }
+    float scale[4]; /* of points in one place, in any unit of length */
+    assert_ok(
+        anchor_scales_from_spacing((const float[12]){0}, 4, ANCHOR_SPACING_LEAST(1e-9f), 2, 1, scale, NULL));
+    assert_true(fabsf(scale[3] / (2e-9f / 64) - 1) < 1e-5f);
 }
 
 static void same_bits_for_all_threads(void **state)

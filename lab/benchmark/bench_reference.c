@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "trace/rounding_band.h"
@@ -76,7 +77,7 @@ void bench_reference_free(bench_reference *reference)
 static void add_error(bench_error *sum, double error)
 {
     sum->psnr += error * error; /* a sum of squares, until bench_error_of() */
-    sum->max = fabs(error) > sum->max || isnan(error) ? fabs(error) : sum->max; /* NaN stays */
+    sum->max = larger_or_nan(sum->max, fabs(error));
 }
 
 bench_error bench_error_of(double square_sum, double max, size_t values)

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "base/vec.h"
@@ -170,18 +171,11 @@ void draw_random_direction(uint64_t seed, uint64_t stream, uint64_t i, double di
 
 /* ---- comparing ---- */
 
-double draw_larger(double most, double difference)
-{
-    return difference > most || isnan(difference) ? difference : most;
-}
-
-double draw_smaller(double least, double value) { return value < least || isnan(value) ? value : least; }
-
 double draw_difference(const float *a, const float *b, size_t count)
 {
     double most = 0;
     for (size_t i = 0; i < count; i++)
-        most = draw_larger(most, fabs((double)a[i] - (double)b[i]));
+        most = larger_or_nan(most, fabs((double)a[i] - (double)b[i]));
     return most;
 }
 
@@ -189,7 +183,7 @@ double draw_error(const float *a, const double *exact, size_t count)
 {
     double most = 0;
     for (size_t i = 0; i < count; i++)
-        most = draw_larger(most, fabs((double)a[i] - exact[i]));
+        most = larger_or_nan(most, fabs((double)a[i] - exact[i]));
     return most;
 }
 

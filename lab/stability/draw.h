@@ -56,10 +56,6 @@ void draw_random_direction(uint64_t seed, uint64_t stream, uint64_t i, double di
 /** A turn about y by `yaw` and then about x by `pitch` (radians), as world to camera. */
 void draw_turned(double yaw, double pitch, double rotation[9]);
 
-/** The larger, or the smaller, of the two; NaN when one of them is. */
-double draw_larger(double most, double difference);
-double draw_smaller(double least, double value);
-
 /** Largest difference; NaN when a value is not finite. */
 double draw_difference(const float *a, const float *b, size_t count);
 double draw_error(const float *a, const double *exact, size_t count);

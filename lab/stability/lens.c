@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "base/vec.h"
@@ -86,8 +87,8 @@ static double compare_faces(stability *s, const gaussians *g, const gbt_camera *
         for (size_t p = 0; p < ray_image_count(&rays) && s->status == GBT_OK; p++) {
             const float *d = others.dir + 3 * p;
             if (d[0] != 0 || d[1] != 0 || d[2] != 0)
-                most =
-                    draw_larger(most, draw_difference(face.rgb.pixels + 3 * p, whole.rgb.pixels + 3 * p, 3));
+                most = larger_or_nan(most,
+                                     draw_difference(face.rgb.pixels + 3 * p, whole.rgb.pixels + 3 * p, 3));
         }
     }
     drawing_free(&face);
@@ -146,7 +147,7 @@ static void off_axis_curves(stability *s)
             double error[2] = {0, 0};
             off_axis(s, distances[d], angles[a] * degree, &ours, &theirs, error);
             for (int r = 0; r < 2; r++)
-                worst[r] = draw_larger(worst[r], error[r]);
+                worst[r] = larger_or_nan(worst[r], error[r]);
             if (d == 0)
                 stability_point(chart, 0, angles[a], error[0]);
             stability_point(chart, d == 0 ? 1 : 2, angles[a], error[1]);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "stability/crowd.h"
@@ -32,10 +33,10 @@ static void compare_stack(const drawing *d, size_t pixel, double alpha, size_t n
     stack_exact(alpha, n, stop, &T, &red, &blue);
     const float *rgb = d->rgb.pixels + 3 * pixel;
     const double off = fabs((double)d->transmittance[pixel] - T);
-    out->absolute = draw_larger(out->absolute, off);
-    out->relative = draw_larger(out->relative, off / T);
+    out->absolute = larger_or_nan(out->absolute, off);
+    out->relative = larger_or_nan(out->relative, off / T);
     out->color =
-        draw_larger(out->color, draw_larger(fabs((double)rgb[0] - red), fabs((double)rgb[2] - blue)));
+        larger_or_nan(out->color, larger_or_nan(fabs((double)rgb[0] - red), fabs((double)rgb[2] - blue)));
 }
 
 static void stack_up(stability *s, size_t n, double alpha, double depth, gaussians *g)
@@ -121,7 +122,7 @@ static size_t bits_changed(const stability *s, const drawing d[2], const bool *o
         if (on_edge[i / 3])
             continue;
         changed += memcmp(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], sizeof(float)) != 0;
-        *most = draw_larger(*most, draw_difference(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], 1));
+        *most = larger_or_nan(*most, draw_difference(&d[0].rgb.pixels[i], &d[1].rgb.pixels[i], 1));
     }
     return changed;
 }
@@ -225,7 +226,7 @@ gbt_status stability_a6(stability *s)
         d = (drawing){.traced.kernel = kernels[k]};
         draw_traced(s, &d, &g, &settings, &rays);
         if (s->status == GBT_OK)
-            worst = draw_larger(worst, draw_error(d.rgb.pixels, exact, 3 * 64));
+            worst = larger_or_nan(worst, draw_error(d.rgb.pixels, exact, 3 * 64));
     }
     stability_check(s, "A6a", worst, NAN, "%zu on every ray; the worst of four kernels.", count);
     drawing_free(&d);
@@ -243,7 +244,7 @@ gbt_status stability_a6(stability *s)
     draw_traced(s, &d, &g, &settings, &rays);
     double shown = 0;
     for (size_t i = 0; i < 3 * 64 && s->status == GBT_OK; i++)
-        shown = draw_larger(shown, fabs((double)d.rgb.pixels[i] - (double)settings.background[i % 3]));
+        shown = larger_or_nan(shown, fabs((double)d.rgb.pixels[i] - (double)settings.background[i % 3]));
     stability_check(s, "A6b", shown, NAN, "%s", "");
     mem_free(exact);
     drawing_free(&d);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -108,7 +109,7 @@ static void nobody_left(stability *s)
         stability_ok(s, frame_render(&f, frame_neural(&none, &d), &camera, &settings, false, s->err))) {
         off = 0;
         for (size_t i = 0; i < 3 * 40 * 30; i++)
-            off = draw_larger(off, fabs((double)f.rgb.pixels[i] - (double)settings.background[i % 3]));
+            off = larger_or_nan(off, fabs((double)f.rgb.pixels[i] - (double)settings.background[i % 3]));
     }
     stability_check(s, "A14d", off, NAN, "%s", "");
     frame_free(&f);
@@ -133,7 +134,7 @@ gbt_status stability_a14(stability *s)
     double far = 0;
     for (size_t i = 100; i < c.a.count; i++)
         for (size_t k = 0; k < 3; k++)
-            far = draw_larger(far, fabs((double)c.a.position[3 * i + k] - 4.5e6));
+            far = larger_or_nan(far, fabs((double)c.a.position[3 * i + k] - 4.5e6));
     stability_check(s, "A14e", c.a.count > 100 ? far : (double)NAN, NAN,
                     "%zu new anchors; a 32-bit index would have put them 2,147 km away.", c.a.count - 100);
     colony_free(&c);
@@ -380,10 +381,10 @@ static void compare_pictures(stability *s, int width, int height, float low, flo
     }
     if (s->status == GBT_OK && stability_ok(s, image_loss(&a, &b, NULL, 0.2, &scratch, &d, &loss, s->err))) {
         const double got = ssim_of(s, &a, &b);
-        out->equal =
-            draw_larger(out->equal, draw_larger(fabs(1 - ssim_of(s, &a, &a)), fabs(1 - ssim_of(s, &b, &b))));
-        out->error = draw_larger(out->error, fabs(got - ssim_exact(&a, &b)));
-        out->beyond = draw_larger(out->beyond, fabs(got) - 1);
+        out->equal = larger_or_nan(out->equal,
+                                   larger_or_nan(fabs(1 - ssim_of(s, &a, &a)), fabs(1 - ssim_of(s, &b, &b))));
+        out->error = larger_or_nan(out->error, fabs(got - ssim_exact(&a, &b)));
+        out->beyond = larger_or_nan(out->beyond, fabs(got) - 1);
         out->bad += draw_count_bad(d.pixels, 3 * (size_t)width * (size_t)height);
     }
     image_free(&a);

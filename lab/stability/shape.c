@@ -154,7 +154,7 @@ gbt_status stability_a2(stability *s)
             measure_ratio(s, n, pancake, ratios[i], count, error);
             for (int r = 0; r < 2; r++) {
                 if (ratios[i] <= promised)
-                    worst[pancake][r] = draw_larger(worst[pancake][r], error[r]);
+                    worst[pancake][r] = larger_or_nan(worst[pancake][r], error[r]);
                 if (!pancake)
                     stability_point(chart, r, ratios[i], fmax(error[r], 1e-7));
             }
@@ -219,7 +219,7 @@ static double splat_through(stability *s, drawing *d, const gaussians *g, size_t
         draw_splatted(s, d, g, &splat, &camera);
         const double alpha = alpha_at(s, d, SIZE * SIZE / 2);
         if (i > 0)
-            most = draw_larger(most, fabs(alpha - last));
+            most = larger_or_nan(most, fabs(alpha - last));
         last = alpha;
         stability_point(chart, 1, origin[2], alpha);
     }
@@ -237,7 +237,7 @@ static double known_poses(stability *s, drawing *d, const gaussians *g, const tr
         draw_ray(&rays, i, poses + 7 * i, poses + 7 * i + 3);
     draw_traced(s, d, g, settings, &rays);
     for (size_t i = 0; i < count; i++)
-        most = draw_larger(most, fabs(alpha_at(s, d, i) - poses[7 * i + 6]));
+        most = larger_or_nan(most, fabs(alpha_at(s, d, i) - poses[7 * i + 6]));
     ray_image_free(&rays);
     return most;
 }
@@ -407,13 +407,13 @@ gbt_status stability_a5(stability *s)
             f.moved.mean_y[k] = (float)((double)f.local.mean_y[k] + D),
             f.moved.mean_z[k] = (float)((double)f.local.mean_z[k] + D);
         naive_at_limit = psnr_at(s, &f, away);
-        naive_least = draw_smaller(naive_least, naive_at_limit);
+        naive_least = smaller_or_nan(naive_least, naive_at_limit);
         stability_point(chart, 1, fmax(D, 1), naive_at_limit);
         load_far(s, &f, D, origin);
         for (int k = 0; k < 3; k++)
             shift[k] = D - origin[k];
         const double psnr = psnr_at(s, &f, shift);
-        least = draw_smaller(least, psnr);
+        least = smaller_or_nan(least, psnr);
         stability_point(chart, 0, fmax(D, 1), psnr);
     }
     stability_check(

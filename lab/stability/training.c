@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "anchor/decode_layout.h"
+#include "base/compare.h"
 #include "base/cpu.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -139,8 +140,8 @@ static void look_from_everywhere(stability *s, far_views *f)
             if ((is_near || is_far) && level)
                 lost[is_far] = loss;
             else if (is_near || is_far)
-                elsewhere = draw_larger(elsewhere, loss);
-            outside_most = draw_larger(outside_most, outside);
+                elsewhere = larger_or_nan(elsewhere, loss);
+            outside_most = larger_or_nan(outside_most, outside);
         }
     /* On an anchor: direction and distance are not defined. */
     gbt_camera on = practice_camera(f->p, 0, 0, own);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/rng.h"
 #include "stability/crowd.h"
@@ -77,7 +78,7 @@ static void compare_poses(stability *s, const turning *t, const gaussians *g, tr
         for (size_t i = 0; i < 3 * t->count && p > 0 && s->status == GBT_OK; i++) {
             *changed += memcmp(&t->first[i], &t->turned[i], sizeof(float)) != 0;
             if (!t->on_edge[i / 3])
-                *most = draw_larger(*most, draw_difference(&t->first[i], &t->turned[i], 1));
+                *most = larger_or_nan(*most, draw_difference(&t->first[i], &t->turned[i], 1));
         }
     }
     ray_image_free(&rays);
@@ -196,7 +197,7 @@ static void look_around(onlooker *o, const gbt_camera *camera, const bool still[
         look_up(&o->d.rgb, camera, dir, now);
         for (int c = 0; c < 3; c++) {
             if (o->has_last && still[i])
-                o->jump = draw_larger(o->jump, fabs(now[c] - o->last[i][c]));
+                o->jump = larger_or_nan(o->jump, fabs(now[c] - o->last[i][c]));
             o->last[i][c] = now[c];
         }
         if (i == LOOK_COUNT / 2 + 5) /* 4 degrees aside */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "stability/draw.h"
 #include "trace/footprint.h"
@@ -133,7 +134,7 @@ static void compare_flicker(stability *s, zoom *z, double worst[ZOOM_WAYS])
     stability_ok(s, scratch == NULL ? GBT_ERR_NO_MEMORY : GBT_OK);
     for (size_t i = 0; i < count; i++)
         for (zoom_way way = 0; way < ZOOM_EXACT && s->status == GBT_OK; way++)
-            worst[way] = draw_larger(worst[way], flicker_of(s, z, way, distances[i], size, scratch));
+            worst[way] = larger_or_nan(worst[way], flicker_of(s, z, way, distances[i], size, scratch));
     mem_free(scratch);
 }
 

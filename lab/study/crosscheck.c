@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
@@ -68,7 +69,7 @@ static bench_error compare(const image *a, const image *b)
     for (size_t i = 0; i < count; i++) {
         const double off = fabs((double)a->pixels[i] - (double)b->pixels[i]);
         sum += off * off;
-        max = off > max || isnan(off) ? off : max; /* NaN stays */
+        max = larger_or_nan(max, off);
     }
     return bench_error_of(sum, max, count);
 }
@@ -91,10 +92,10 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
             const double off = fabs((double)traced->pixels[k] - (double)splatted->pixels[k]);
             square += off * off;
-            max = fmax(max, off);
+            max = larger_or_nan(max, off);
         }
         bool in_band = false;
-        if (max > 1e-5 || isnan(square))
+        if (!(max <= 1e-5))
             status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i,
                                         &scratch, &in_band);
         left_out += in_band;

@@ -263,7 +263,7 @@ static gbt_status check_places(const char *input, const char *json, const char *
     for (size_t i = 0; i < output_count; i++)
         for (size_t k = 0; k <= i; k++) {
             const char *other = k < i ? outputs[k] : json;
-            if (other != NULL && (strcmp(other, outputs[i]) == 0 || file_is_same(other, outputs[i])))
+            if (other != NULL && file_is_one(other, outputs[i]))
                 return base_fail(err, GBT_ERR_ARGUMENT,
                                  "%s: would be written twice (each output must be another file)", other);
         }

@@ -3,11 +3,16 @@
 #ifndef GBT_BASE_COMPARE_H
 #define GBT_BASE_COMPARE_H
 
+#include <math.h>
 #include <stddef.h>
 
 /** As fmaxf() and fminf() of numbers, but not calls. */
 static inline float larger(float a, float b) { return a > b ? a : b; }
 static inline float smaller(float a, float b) { return a < b ? a : b; }
+
+/** The larger, or the smaller, of the two; NaN when one of them is. */
+static inline double larger_or_nan(double a, double b) { return b > a || isnan(b) ? b : a; }
+static inline double smaller_or_nan(double a, double b) { return b < a || isnan(b) ? b : a; }
 
 static inline size_t smaller_size(size_t a, size_t b) { return a < b ? a : b; }
 

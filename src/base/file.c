@@ -249,6 +249,8 @@ bool file_is_same(const char *a, const char *b)
            first.st_ino == second.st_ino;
 }
 
+bool file_is_one(const char *a, const char *b) { return strcmp(a, b) == 0 || file_is_same(a, b); }
+
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out)
 {
     DIR *entries = opendir(folder);

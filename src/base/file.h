@@ -89,6 +89,9 @@ bool file_is_folder(const char *path);
 /** Whether both are there, and are one file or folder, whatever they are called. */
 bool file_is_same(const char *a, const char *b);
 
+/** Whether what is written to the one is written to the other: the same path, or one file that is there. */
+bool file_is_one(const char *a, const char *b);
+
 /** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out);
 

@@ -31,17 +31,23 @@ static bool same_name(const char *name, size_t name_length, const char *typed, s
     return true;
 }
 
+bool options_has_word(const char *words, const char *typed, size_t length)
+{
+    for (const char *word = words; word != NULL && *word != '\0';) {
+        const size_t end = strcspn(word, " ");
+        if (same_name(word, end, typed, length))
+            return true;
+        word += end + strspn(word + end, " ");
+    }
+    return false;
+}
+
 static bool row_is(const option *o, const char *typed, size_t length)
 {
     if (length == 1 ? o->short_name == typed[0] : same_name(o->name, strlen(o->name), typed, length))
         return true;
-    for (const char *name = o->aliases; name != NULL && *name != '\0';) {
-        const size_t end = strcspn(name, " ");
-        if (same_name(name, end, typed, length))
-            return true;
-        name += end + strspn(name + end, " ");
-    }
-    return o->kind != OPTION_FLAG_OFF && options_is_field(o, typed, length);
+    return options_has_word(o->aliases, typed, length) ||
+           (o->kind != OPTION_FLAG_OFF && options_is_field(o, typed, length));
 }
 
 bool options_is_field(const option *o, const char *name, size_t length)

@@ -227,24 +227,12 @@ static int check_words(const command *self, const char *typed)
                            nearest != NULL ? "?" : "");
 }
 
-static bool has_word(const char *words, const char *word)
-{
-    const size_t length = strlen(word);
-    for (; *words != '\0'; words += strspn(words, " ")) {
-        const size_t end = strcspn(words, " ");
-        if (end == length && strncmp(words, word, length) == 0)
-            return true;
-        words += end;
-    }
-    return false;
-}
-
 /* What was typed belongs to the first operand. Files and variables may say more, for other uses. */
 static int check_belongs(const command *self, const option_table *t, const bool *typed, const operands *out)
 {
     for (int i = 0; i < t->own && out->count > 0; i++) {
         const option *o = &t->rows[i];
-        if (typed[i] && o->of != NULL && !has_word(o->of, out->value[0]))
+        if (typed[i] && o->of != NULL && !options_has_word(o->of, out->value[0], strlen(out->value[0])))
             return command_misused("--%s: not of %s %.60s (of %s)", o->name, self->name, out->value[0],
                                    o->of);
     }

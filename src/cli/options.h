@@ -164,6 +164,9 @@ void options_bad_value(const option *o, const char *wanted, const char *text, ch
     letter. */
 int options_find(const option *options, int option_count, const char *name, size_t length);
 
+/** Whether what was typed is among words with blanks between (NULL: none), where _ may stand for -. */
+bool options_has_word(const char *words, const char *typed, size_t length);
+
 /** Whether the library calls a row by this name. */
 bool options_is_field(const option *o, const char *name, size_t length);
 

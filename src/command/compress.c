@@ -235,8 +235,7 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
     if (stays)
         return GBT_OK;
     GBT_TRY(find_model(run, path, sizeof path, err));
-    if (def->json != NULL &&
-        (strcmp(def->json, out) == 0 || file_is_same(def->json, out) || file_is_same(def->json, path)))
+    if (def->json != NULL && (file_is_one(def->json, out) || file_is_same(def->json, path)))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
                          def->json);
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);

@@ -317,8 +317,7 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
     anchor_init_def how = anchor_init_def_default();
     GBT_TRY(check_def(def, err));
     if (file_is_same(data, out_ply) ||
-        (json_path != NULL && (file_is_same(data, json_path) || strcmp(out_ply, json_path) == 0 ||
-                               file_is_same(out_ply, json_path))))
+        (json_path != NULL && (file_is_same(data, json_path) || file_is_one(out_ply, json_path))))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (the output must be another file)",
                          file_is_same(data, out_ply) ? out_ply : json_path);
     scene s;

@@ -136,10 +136,11 @@ void report_again(text *out, const char *run, const json_t *metrics)
     snprintf(config, sizeof config, "%s/config", run);
     text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n");
     if (file_exists(config)) { /* imported models have none */
-        text_add(out, "<p>A time budget decides only how many steps there are. With the pace that this run "
-                      "recorded, the "
-                      "same photos give the same model, bit for bit, on any number of threads:</p>\n<pre "
-                      "class=\"card\">gbtrace train --config ");
+        text_add(
+            out,
+            "<p>A time budget decides only how many steps there are. With the pace that this run "
+            "recorded, the same photos give the same model, bit for bit, on any number of threads:</p>\n<pre "
+            "class=\"card\">gbtrace train --config ");
         text_escaped(out, gbt_shell_word(config, word, sizeof word));
         text_add(out, " -o NEW");
         const size_t before = out->length;

@@ -585,7 +585,32 @@ static void opacities_are_raised(void **state)
 
 /* ---- poor points ---- */
 
-/* A copy of the tiny scene with only its first points, moved along the optical axes by `shift`. */
+/* A copy of the tiny scene, in units of which each of its own has `unit`, with the first `keep` of its
+   points, moved along the optical axes by `shift`. Returns its folder. */
+static const char *copy_tiny(const char *name, const scene *s, size_t keep, double unit, double shift)
+{
+    colmap_image pictures[VIEWS];
+    colmap_point points[200];
+    memset(pictures, 0, sizeof pictures);
+    memset(points, 0, sizeof points);
+    assert_true(s->view_count == VIEWS && keep <= 200);
+    const char *folder = in_root("%s", name);
+    assert_ok(file_make_folder(folder, NULL));
+    assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
+    for (size_t v = 0; v < VIEWS; v++) {
+        pictures[v] = (colmap_image){.name = s->views[v].name, .camera = s->views[v].camera};
+        for (int k = 0; k < 3; k++)
+            pictures[v].camera.center[k] *= unit;
+    }
+    for (size_t p = 0; p < keep; p++)
+        for (size_t k = 0; k < 3; k++) {
+            points[p].position[k] = unit * (double)s->points.position[3 * p + k] + (k == 2 ? shift : 0);
+            points[p].color[k] = (unsigned char)(255 * s->points.color[3 * p + k] + 0.5f);
+        }
+    assert_ok(colmap_write(joined(folder, "sparse/0"), pictures, VIEWS, points, keep, NULL));
+    return folder;
+}
+
 static void points_that_tell_nothing_are_replaced(void **state)
 {
     (void)state;
@@ -602,20 +627,7 @@ static void points_that_tell_nothing_are_replaced(void **state)
         scene s;
         const scene_split split = {.kind = SCENE_SPLIT_NONE};
         assert_ok(scene_load(tiny, &split, &s, NULL));
-        colmap_image pictures[VIEWS];
-        colmap_point points[200];
-        memset(pictures, 0, sizeof pictures);
-        memset(points, 0, sizeof points);
-        const char *folder = in_root("%s", cases[i].name);
-        assert_ok(file_make_folder(folder, NULL));
-        assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
-        for (size_t v = 0; v < s.view_count; v++)
-            pictures[v] = (colmap_image){.name = s.views[v].name, .camera = s.views[v].camera};
-        for (size_t p = 0; p < cases[i].keep; p++)
-            for (size_t k = 0; k < 3; k++)
-                points[p].position[k] = (double)s.points.position[3 * p + k] + (k == 2 ? cases[i].shift : 0);
-        assert_ok(
-            colmap_write(joined(folder, "sparse/0"), pictures, s.view_count, points, cases[i].keep, NULL));
+        const char *folder = copy_tiny(cases[i].name, &s, cases[i].keep, 1, cases[i].shift);
         gbt_train_def def = run_def();
         trainer t;
         step_report r;
@@ -641,25 +653,9 @@ static void the_unit_of_length_does_not_matter(void **state)
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     assert_ok(scene_load(tiny, &split, &s, NULL));
     for (int i = 0; i < 3; i++) {
-        colmap_image pictures[VIEWS];
-        colmap_point points[200];
-        memset(pictures, 0, sizeof pictures);
-        memset(points, 0, sizeof points);
-        assert_true(s.view_count == VIEWS && s.points.count <= 200);
-        const char *folder = in_root("unit%d", i);
-        assert_ok(file_make_folder(folder, NULL));
-        assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
-        for (size_t v = 0; v < VIEWS; v++) {
-            pictures[v] = (colmap_image){.name = s.views[v].name, .camera = s.views[v].camera};
-            for (int k = 0; k < 3; k++)
-                pictures[v].camera.center[k] *= units[i];
-        }
-        for (size_t p = 0; p < s.points.count; p++)
-            for (size_t k = 0; k < 3; k++) {
-                points[p].position[k] = units[i] * (double)s.points.position[3 * p + k];
-                points[p].color[k] = (unsigned char)(255 * s.points.color[3 * p + k] + 0.5f);
-            }
-        assert_ok(colmap_write(joined(folder, "sparse/0"), pictures, VIEWS, points, s.points.count, NULL));
+        char name[16];
+        snprintf(name, sizeof name, "unit%d", i);
+        const char *folder = copy_tiny(name, &s, s.points.count, units[i], 0);
         gbt_train_def def = run_def();
         trainer t;
         open_ok(&t, folder, &def);

@@ -15,7 +15,7 @@
 enum { MEAN = 0, SCALE = 3, QUAT = 6, OPACITY = 10, COLOR = 11, TILE = 16, PIXEL_GRAIN = 64 };
 
 typedef struct lens {
-    double focal[2], principal[2], limit[2]; /* principal: from the centre of the first pixel */
+    double focal[2], principal[2], low[2], high[2]; /* principal: from the centre of the first pixel */
     double center[3];
 } lens;
 
@@ -39,8 +39,10 @@ static gbt_status read_lens(const gbt_camera *camera, lens *out, gbt_error *err)
     const int side[2] = {camera->width, camera->height};
     for (int k = 0; k < 2; k++) {
         out->focal[k] = camera->params[one ? 0 : k];
-        out->principal[k] = camera->params[one ? 1 + k : 2 + k] - 0.5;
-        out->limit[k] = 1.3 * side[k] / (2 * out->focal[k]);
+        const double principal = camera->params[one ? 1 + k : 2 + k];
+        out->principal[k] = principal - 0.5;
+        out->low[k] = (-0.15 * side[k] - principal) / out->focal[k];
+        out->high[k] = (1.15 * side[k] - principal) / out->focal[k];
     }
     for (int k = 0; k < 3; k++)
         out->center[k] = rounded_to_float(camera->center[k]); /* where the rays of the tracer start */
@@ -77,7 +79,7 @@ static bool flatten(const raster_reference *scene, const gbt_camera *camera, con
     memset(f->j, 0, sizeof f->j);
     for (int a = 0; a < 2; a++) {
         const double ratio = f->t[a] / f->t[2];
-        f->kept[a] = fmax(-l->limit[a], fmin(l->limit[a], ratio));
+        f->kept[a] = fmax(l->low[a], fmin(l->high[a], ratio));
         f->j[a][a] = l->focal[a] / f->t[2];
         f->j[a][2] = -l->focal[a] * f->kept[a] / f->t[2];
         f->point[a] = l->focal[a] * ratio + l->principal[a];

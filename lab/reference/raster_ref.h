@@ -7,7 +7,8 @@
 
        t = W (mu - c), drawn when t_z > near      centre = (fx t_x / t_z + cx, fy t_y / t_z + cy)
        J = [fx / t_z, 0, -fx kx / t_z; 0, fy / t_z, -fy ky / t_z]
-       kx = t_x / t_z kept within 1.3 width / (2 fx), ky likewise
+       kx = t_x / t_z kept in the picture and 0.15 of its width on each side, [-cx - 0.15 width, 1.15 width -
+            cx] / fx with cx from the picture's edge; ky likewise
        C = J W Sigma W^T J^T + dilation I      p = -1/2 d^T C^-1 d, d = centre - pixel
        alpha = min(alpha_max, o exp(p))
 

@@ -104,7 +104,7 @@ static const char tail[] =
     "The environment overrides\n.BR \\-\\-config ,\nthe command line overrides both. Empty variables are "
     "ignored.\n"
     ".TP\n\\fBGBT_ISA\\fR\n"
-    "Highest instruction set that the kernels use:\n.BR plain ,\n.BR neon ,\n.B avx2\nor\n.BR avx512 .\nThe "
+    "Highest instruction set that the kernels of tracing, splats, networks and loss use:\n.BR plain ,\n.BR neon ,\n.B avx2\nor\n.BR avx512 .\nThe "
     "results are "
     "the same.\n"
     ".SH EXIT STATUS\n"

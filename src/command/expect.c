@@ -7,10 +7,10 @@
 #include "train/photos.h"
 #include "train/step_size.h"
 
-/* Core-seconds of a step, for the anchors in view and by its pixels, with AVX2; in the last part of a run
-   rays have twice the hits. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo on
-   two cores of a server CPU (bench/figures.py), which they meet within a quarter. */
-static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76, hits_of_last_part = 2;
+/* Core-seconds of a step, for the anchors in view and by its pixels, with AVX2. Chosen on runs of 42, 84 and
+   120 s of plush, fox, castle, aerial and the demo on two cores of a server CPU (bench/figures.py), which
+   they meet within a quarter. */
+static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76;
 static const double score_core_seconds_per_megapixel = 5.5;
 static const double default_budget_seconds = 600;
 
@@ -26,7 +26,7 @@ static double core_seconds_of_step(const gbt_camera *camera, const train_rules *
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double progress = (part + 0.5) / PACE_SEGMENTS,
                      megapixels = step_size_of(camera, rules, progress).pixels / 1e6,
-                     hits = progress < SCHEDULE_EXACT_FROM ? 1 : hits_of_last_part;
+                     hits = step_hits_per_pixel(rules, progress);
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;
     }

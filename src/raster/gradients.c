@@ -91,9 +91,9 @@ static shape_gradient return_ewa(const raster_view *view, const one_gaussian *g,
     const double focal[2] = {view->fx, view->fy}, z_inverse = 1 / t[2];
     double ratio[2], kept[2];
     for (int r = 0; r < 2; r++) {
-        const double limit = view->limit[r];
+        const double low = view->low[r], high = view->high[r];
         ratio[r] = t[r] * z_inverse;
-        kept[r] = ratio[r] < -limit ? -limit : ratio[r] > limit ? limit : ratio[r];
+        kept[r] = ratio[r] < low ? low : ratio[r] > high ? high : ratio[r];
         for (int k = 0; k < 3; k++)
             y[r][k] = focal[r] * z_inverse * (axis[r][k] - kept[r] * axis[2][k]);
     }

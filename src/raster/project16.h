@@ -50,11 +50,16 @@ static inline void place_lanes(const raster_view *view, const gaussians *g, size
    digits. */
 static inline void project_lanes(const raster_view *view, lane_splats *s)
 {
-    const double lx = view->limit[0], ly = view->limit[1], fx = view->fx, fy = view->fy,
-                 d = (double)view->settings.dilation;
+    const double fx = view->fx, fy = view->fy, d = (double)view->settings.dilation;
+    const double x_low = view->low[0], x_high = view->high[0], y_low = view->low[1], y_high = view->high[1];
     for (int i = 0; i < PIXEL_LANES; i++) {
         const double inverse = 1 / s->t[2][i], rx = s->t[0][i] * inverse, ry = s->t[1][i] * inverse;
-        const double kx = rx < -lx ? -lx : rx > lx ? lx : rx, ky = ry < -ly ? -ly : ry > ly ? ly : ry;
+        const double kx = rx < x_low    ? x_low
+                          : rx > x_high ? x_high
+                                        : rx,
+                     ky = ry < y_low    ? y_low
+                          : ry > y_high ? y_high
+                                        : ry;
         const double gx = fx * inverse, gy = fy * inverse;
         const double x0 = gx * (s->axis[0][i] - kx * s->axis[6][i]),
                      y0 = gy * (s->axis[3][i] - ky * s->axis[6][i]);

@@ -104,8 +104,12 @@ static gbt_status make_view(const gbt_camera *camera, const raster_settings *set
                          "raster: a camera of %d x %d pixels, focal lengths %g and %g (wanted 1 to %d "
                          "pixels, lengths > 0, a finite pose)",
                          out->width, out->height, out->fx, out->fy, side_limit);
-    out->limit[0] = 1.3 * 0.5 * out->width / out->fx;
-    out->limit[1] = 1.3 * 0.5 * out->height / out->fy;
+    const double side[2] = {out->width, out->height}, focal[2] = {out->fx, out->fy},
+                 principal[2] = {out->cx + 0.5, out->cy + 0.5};
+    for (int k = 0; k < 2; k++) {
+        out->low[k] = -(principal[k] + 0.15 * side[k]) / focal[k];
+        out->high[k] = (1.15 * side[k] - principal[k]) / focal[k];
+    }
     out->tiles_across = (out->width + TILE_PIXELS - 1) / TILE_PIXELS;
     out->tiles_down = (out->height + TILE_PIXELS - 1) / TILE_PIXELS;
     return GBT_OK;

@@ -14,6 +14,9 @@
 /* Cameras are taken to lie in a plane when their spread across it is below this share of the next larger, and
    it faces up. */
 static const double flat_share = 0.2, flat_cosine = 0.7;
+/* Nearer to the cameras than this share of the points' distance they look at nothing: they turned on the
+   spot, and their axes meet where they stand. */
+static const double on_the_spot_share = 0.02;
 static const double tan_widest = 2; /* of a lens that no pinhole stands for, 127 degrees */
 
 /** The upper median; sorts. */
@@ -59,9 +62,12 @@ static void find_up(const gbt_camera *cameras, size_t count, const double middle
     for (int k = 1; k < 3; k++)
         if (spread[4 * k] < spread[4 * low])
             low = k;
-    const double next = fmin(spread[4 * ((low + 1) % 3)], spread[4 * ((low + 2) % 3)]);
+    const double one = spread[4 * ((low + 1) % 3)], other = spread[4 * ((low + 2) % 3)],
+                 next = fmin(one, other), largest = fmax(one, other);
     const double normal[3] = {axes[low], axes[3 + low], axes[6 + low]}, cosine = dvec_dot(normal, up);
-    if (next > 0 && spread[4 * low] < flat_share * flat_share * next && fabs(cosine) > flat_cosine)
+    /* Three cameras always lie in a plane, and cameras on a line in many. */
+    if (count > 3 && next > flat_share * flat_share * largest &&
+        spread[4 * low] < flat_share * flat_share * next && fabs(cosine) > flat_cosine)
         for (int k = 0; k < 3; k++)
             up[k] = cosine < 0 ? -normal[k] : normal[k];
 }
@@ -142,6 +148,30 @@ static void find_lens(const gbt_camera *cameras, size_t count, double *scratch, 
                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 }
 
+static double median_distance(const gbt_camera *cameras, size_t count, const double point[3], double *scratch)
+{
+    for (size_t i = 0; i < count; i++) {
+        double way[3];
+        for (int k = 0; k < 3; k++)
+            way[k] = cameras[i].center[k] - point[k];
+        scratch[i] = dvec_length(way);
+    }
+    return median(scratch, count);
+}
+
+/** From `middle`; 0 without points. */
+static double median_point_distance(const float *points, size_t count, const double middle[3],
+                                    double *scratch)
+{
+    for (size_t i = 0; i < count; i++) {
+        double way[3];
+        for (int k = 0; k < 3; k++)
+            way[k] = (double)points[3 * i + (size_t)k] - middle[k];
+        scratch[i] = dvec_length(way);
+    }
+    return count > 0 ? median(scratch, count) : 0;
+}
+
 gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count,
                              camera_group *out, gbt_error *err)
 {
@@ -152,18 +182,15 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
     memset(out, 0, sizeof *out);
     mean_center(cameras, count, middle);
     find_up(cameras, count, middle, out->up);
-    if (!nearest_to_axes(cameras, count, middle, out->focus) &&
+    const double far = median_point_distance(points, point_count, middle, scratch),
+                 least = fmax(on_the_spot_share * far, 1e-12);
+    if (!(nearest_to_axes(cameras, count, middle, out->focus) &&
+          median_distance(cameras, count, out->focus, scratch) > least) &&
         !amid_points(cameras, count, middle, points, point_count, scratch, out->focus))
         memset(out->focus, 0, sizeof out->focus);
-    for (size_t i = 0; i < count; i++) {
-        double way[3];
-        for (int k = 0; k < 3; k++)
-            way[k] = cameras[i].center[k] - out->focus[k];
-        scratch[i] = dvec_length(way);
-    }
-    out->distance = median(scratch, count);
-    if (!(out->distance > 1e-12))
-        out->distance = 1;
+    out->distance = median_distance(cameras, count, out->focus, scratch);
+    if (!(out->distance > least))
+        out->distance = far > 0 ? far : 1;
     find_lens(cameras, count, scratch, &out->lens);
     mem_free(scratch);
     return GBT_OK;

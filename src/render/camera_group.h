@@ -10,18 +10,18 @@
 #include "gbtrace/status.h"
 
 typedef struct camera_group {
-    double up[3]; /* unit: across the plane that the cameras lie in when there is one, else the mean of their
-                     upward axes */
+    double up[3];    /* unit: across the plane that more than three cameras lie in when there is one, else the
+                        mean of their upward axes */
     double focus[3]; /* the point that they look at */
-    double distance; /* median from a camera to the focus, > 0 */
+    double distance; /* median from a camera to the focus, > 0; to the points where they turned on the spot */
     gbt_camera lens; /* a pinhole at rest: the size of the first camera, and the median view across the
                         shorter side */
 } camera_group;
 
 /**
  * The focus is the point nearest to all axes of view (least squares). Where the axes are within about 6
- * degrees of each other, or most cameras look away from that point, it is the median depth of the points in
- * front of the mean camera; without such points the local origin.
+ * degrees of each other, most cameras look away from that point, or it is where they stand, it is the median
+ * depth of the points in front of the mean camera; without such points the local origin.
  *
  * @param cameras [in] [count], count >= 1, poses finite
  * @param points  [in] [point_count][3], scene-local

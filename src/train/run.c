@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -15,6 +14,7 @@
 #include "base/vec.h"
 #include "cluster/cluster.h"
 #include "train/align.h"
+#include "train/budget.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/old_run.h"
@@ -24,7 +24,6 @@
 #include "train/run_log.h"
 #include "train/run_split.h"
 #include "train/save.h"
-#include "train/step_size.h"
 #include "train/trainer.h"
 
 void gbt_set_threads(int threads) { parallel_set_threads(threads); }
@@ -73,59 +72,6 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
     return file_make_folder(checkpoints, err);
 }
 
-/* ---- the time budget ---- */
-
-/* How long a step takes: so much by itself and so much per pixel of its first view, followed as the run
-   changes. */
-typedef struct speed {
-    double fixed_seconds, pixel_seconds;
-    bool known;
-} speed;
-
-static void speed_follow(speed *s, const step_report *r)
-{
-    const frame_times *f = &r->times;
-    const double pixels = (double)r->width * (double)r->height;
-    const double per_pixel =
-        (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside / pixels;
-    const double fixed = fmax(0, r->all.wall - per_pixel * pixels - r->photo.wall);
-    const double keep = s->known ? 0.95 : 0;
-    s->fixed_seconds = keep * s->fixed_seconds + (1 - keep) * fixed;
-    s->pixel_seconds = keep * s->pixel_seconds + (1 - keep) * per_pixel;
-    s->known = true;
-}
-
-/* Seconds of a step in this part of the schedule: resolutions may change inside the part, and photos have
-   different sizes. */
-static double expected_step(const trainer *t, const speed *s, int part)
-{
-    enum { PLACES = 8 };
-    double sum = 0;
-    for (size_t v = 0; v < t->train_count; v++) {
-        const gbt_camera camera = photos_camera(&t->photos, t->train_views[v], 0);
-        for (int i = 0; i < PLACES; i++) {
-            const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
-            sum += s->fixed_seconds + s->pixel_seconds * step_size_of(&camera, &t->rules, progress).pixels;
-        }
-    }
-    return sum / (double)(PLACES * t->train_count);
-}
-
-/* Give the next part of the schedule its share of the time that is left. */
-static void pace_extend(trainer *t, const speed *s)
-{
-    const int part = t->pace.known;
-    const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
-    const double per_step = s->known ? expected_step(t, s, part) : 0;
-    /* Before anything has been measured: what the run's steps took before it was resumed, or a few steps, and
-       the rest of the first part's time goes to the next. */
-    const double steps = per_step > 0  ? seconds / per_step
-                         : t->step > 0 ? seconds * (double)t->step / t->seconds
-                                       : 20.0 / t->def.views;
-    t->pace.steps[part] = (uint64_t)fmin(fmax(steps, 1), 1e7);
-    t->pace.known++;
-}
-
 /* ---- the loop ---- */
 
 /* Of a whole run: the last poses of the photos, and what became of them. */
@@ -150,7 +96,7 @@ static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
 
 /* What the first process does between steps. */
 typedef struct run_clock {
-    speed measured;
+    step_speed measured;
     double begin, offset, paused, last_save; /* seconds; offset: of the runs before */
     int next_eval;
     save_beside *saving;
@@ -188,7 +134,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
 {
     const gbt_train_def *def = &t->def;
     if (!report->skipped)
-        speed_follow(&c->measured, report);
+        budget_follow(&c->measured, &t->rules, report, pace_progress(&t->pace, t->step - 1));
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
     if (!save_is_under_way(c->saving))
@@ -232,7 +178,7 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *sav
             if (t->pace.known >= PACE_SEGMENTS)
                 return GBT_OK;
             if (cluster_leads())
-                pace_extend(t, &c.measured);
+                budget_extend(t, &c.measured);
             cluster_broadcast(&t->pace, sizeof t->pace);
             continue;
         }

@@ -23,3 +23,8 @@ step_size step_size_of(const gbt_camera *camera, const train_rules *rules, doubl
         level--;
     return (step_size){.level = level, .parts = 1, .pixels = ldexp(all, -2 * level)};
 }
+
+double step_hits_per_pixel(const train_rules *rules, double progress)
+{
+    return rules->loose_rays && progress >= SCHEDULE_EXACT_FROM ? 2 : 1;
+}

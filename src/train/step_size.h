@@ -20,4 +20,8 @@ typedef struct step_size {
  */
 step_size step_size_of(const gbt_camera *camera, const train_rules *rules, double progress);
 
+/** What a pixel's ray costs at `progress`, as a multiple of the loose rays' (rules.loose_rays): exact ones
+   have twice the hits. */
+double step_hits_per_pixel(const train_rules *rules, double progress);
+
 #endif

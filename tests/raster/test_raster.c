@@ -488,6 +488,37 @@ static void memory_runs_out(void **state)
     gaussians_free(&g);
 }
 
+/* Training looks at parts of large photos: a corner as a camera of its own shows what the whole picture has
+   there, of Gaussians long enough in depth for the limits of J to matter. */
+static void a_part_is_the_part_of_the_picture(void **state)
+{
+    (void)state;
+    enum { SIDE = 96, PART = 32, X = 64, Y = 60 };
+    const cloud_def def = {"parts", 400, 2, 0.02f, 0.08f, 1, {0, 0, -8}, SIDE, SIDE};
+    gaussians g = make_cloud(&def, 5);
+    for (size_t i = 0; i < g.count; i++) {
+        g.quat_w[i] = 1;
+        g.quat_x[i] = g.quat_y[i] = g.quat_z[i] = 0;
+        g.scale_z[i] *= 8;
+    }
+    raster_settings s = form_settings(0);
+    s.exact_cut = true;
+    const gbt_camera whole = make_camera(SIDE, SIDE, def.camera);
+    gbt_camera part;
+    assert_true(gbt_camera_cropped(&whole, X, Y, PART, PART, &part));
+    drawn a = draw(&g, &whole, &s, NULL), b = draw(&g, &part, &s, NULL);
+    double wanted[3 * PART * PART];
+    for (int y = 0; y < PART; y++)
+        for (int x = 0; x < 3 * PART; x++)
+            wanted[y * 3 * PART + x] = (double)a.rgb.pixels[3 * ((Y + y) * SIDE + X) + x];
+    const double psnr = psnr_of(b.rgb.pixels, wanted, 3 * PART * PART);
+    print_message("a part: %.1f dB\n", psnr);
+    assert_true(psnr > 60);
+    drawn_free(&a);
+    drawn_free(&b);
+    gaussians_free(&g);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -505,6 +536,7 @@ int main(void)
         cmocka_unit_test(memory_is_used_again),
         cmocka_unit_test(wrong_arguments),
         cmocka_unit_test(memory_runs_out),
+        cmocka_unit_test(a_part_is_the_part_of_the_picture),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

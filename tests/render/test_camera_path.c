@@ -131,6 +131,47 @@ static void parallel_cameras(void **state)
 
 /* ---- around ---- */
 
+/** They look all around from one place, in a hand: their axes meet there, by chance. */
+static void a_head_looks_at_what_is_around(void **state)
+{
+    (void)state;
+    gbt_camera cameras[12];
+    float points[40][3];
+    for (int i = 0; i < 12; i++) {
+        const double angle = i * PI / 6, x = 1e-3 * cos(5 * angle), z = 1e-3 * sin(7 * angle);
+        cameras[i] = looking(x, 0, z, (const double[3]){x + cos(angle), 0, z + sin(angle)});
+    }
+    for (int i = 0; i < 40; i++) {
+        points[i][0] = 3 * cosf(0.157f * (float)i);
+        points[i][1] = 0.1f * (float)(i % 3 - 1);
+        points[i][2] = 3 * sinf(0.157f * (float)i);
+    }
+    camera_group g;
+    assert_ok(camera_group_make(cameras, 12, points[0], 40, &g, &assert_ok_err_));
+    assert_near(g.distance, 3, 0.1);
+}
+
+/** Cameras on a line, and few of them, lie in no plane of their own: up is what they say. */
+static void a_line_has_no_plane(void **state)
+{
+    (void)state;
+    for (int count = 2; count <= 12; count += count == 3 ? 9 : 1) {
+        gbt_camera cameras[12];
+        for (int i = 0; i < count; i++) {
+            const double bend = count == 3 && i == 1 ? 0.3 : 1e-9 * (i % 2);
+            cameras[i] = looking(0.3 * i, 0.2 * i + bend, -0.1 * i - bend, (const double[3]){0, 0, 5});
+        }
+        double mean[3] = {0};
+        for (int i = 0; i < count; i++)
+            for (int k = 0; k < 3; k++)
+                mean[k] -= cameras[i].rotation[3 + k];
+        dvec_normalize(mean);
+        const camera_group g = group_of(cameras, (size_t)count);
+        for (int k = 0; k < 3; k++)
+            assert_near(g.up[k], mean[k], 1e-9);
+    }
+}
+
 static void closed_orbit(void **state)
 {
     (void)state;
@@ -696,6 +737,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_cameras_look_at),
         cmocka_unit_test(parallel_cameras),
+        cmocka_unit_test(a_head_looks_at_what_is_around),
+        cmocka_unit_test(a_line_has_no_plane),
         cmocka_unit_test(closed_orbit),
         cmocka_unit_test(orbit_of_an_arc),
         cmocka_unit_test(orbit_follows_the_cameras),

@@ -20,6 +20,7 @@
 #include "io/model_file.h"
 #include "quiet.h"
 #include "train/adam.h"
+#include "train/budget.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/seed_points.h"
@@ -312,6 +313,43 @@ static void a_budget_run_can_be_repeated(void **state)
     json_t *repeated = read_summary(in_root("pace"));
     assert_int_equal(json_integer_value(json_object_get(repeated, "iterations")), sum);
     json_decref(repeated);
+}
+
+/* Steps take a time of their own, most of it in reading photos, and one per pixel, twice that where rays are
+   exact. The parts take equal times all the same. */
+static void a_budget_gives_its_parts_equal_times(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 0;
+    def.budget_seconds = 100;
+    trainer t;
+    open_ok(&t, tiny, &def);
+    const gbt_camera camera = photos_camera(&t.photos, t.train_views[0], 0);
+    t.seconds = 0;
+    step_speed speed = {0};
+    for (int part = 0; part < PACE_SEGMENTS; part++) {
+        const double before = t.seconds;
+        budget_extend(&t, &speed);
+        for (uint64_t i = 0; i < t.pace.steps[part]; i++, t.step++) {
+            const double progress = pace_progress(&t.pace, t.step),
+                         pixels = step_size_of(&camera, &t.rules, progress).pixels,
+                         of_pixels = 1e-6 * pixels * (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
+            const step_report report = {.width = (int)pixels,
+                                        .height = 1,
+                                        .beside = 1,
+                                        .times.trace.wall = of_pixels,
+                                        .photo.wall = 0.008,
+                                        .all.wall = 0.01 + of_pixels};
+            budget_follow(&speed, &t.rules, &report, progress);
+            t.seconds += report.all.wall;
+        }
+        if (part > 0) /* in the first nothing is known */
+            assert_true(fabs(t.seconds - before - def.budget_seconds / PACE_SEGMENTS) <
+                        0.1 * def.budget_seconds / PACE_SEGMENTS);
+    }
+    assert_true(fabs(t.seconds - def.budget_seconds) < 0.01 * def.budget_seconds);
+    trainer_free(&t);
 }
 
 /* The clock goes on where it stood, so an interrupted budget run does not get its time twice: a run whose
@@ -1683,6 +1721,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(more_memory_than_allowed),
         cmocka_unit_test(another_seed_changes_bits),
         cmocka_unit_test(a_budget_run_can_be_repeated),
+        cmocka_unit_test(a_budget_gives_its_parts_equal_times),
         cmocka_unit_test(a_budget_run_resumes_its_clock),
         cmocka_unit_test(training_learns),
         cmocka_unit_test(without_growing_the_anchors_stay),

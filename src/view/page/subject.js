@@ -33,7 +33,9 @@ export function findSubject(scene) {
     }));
     const middle = meetingPoint(poses, scene.center), depth = p => dot(sub(middle, p.eye), p.forward);
     const seen = poses.filter(p => depth(p) > 0).map(p => depth(p) * p.spread).sort((a, b) => a - b);
-    if (2 * seen.length > poses.length && length(sub(middle, scene.center)) < 2 * scene.size)
-        return { middle, radius: seen[seen.length >> 1] };
+    const radius = seen[seen.length >> 1];
+    // Cameras that turned on the spot "meet" where they stand.
+    if (2 * seen.length > poses.length && length(sub(middle, scene.center)) < 2 * scene.size && radius > 0.02 * scene.size)
+        return { middle, radius };
     return { middle: scene.center, radius: Math.max(scene.size, 1e-3) };
 }

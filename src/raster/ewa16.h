@@ -74,8 +74,7 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
                    stop_at = vfloat16_set1(settings->transmittance_min);
     const vfloat16 zero = vfloat16_set1(0);
     uint64_t blended = 0;
-    int i = 0;
-    for (; i < chunk->count[block]; i++) {
+    for (int i = 0; i < chunk->count[block]; i++) {
         const int e = chunk->list[block][i];
         const splat *s = chunk->splats[e];
         const ewa_response r = ewa_respond(s, chunk->at[e][0], chunk->at[e][1], block);
@@ -103,8 +102,7 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
             break;
     }
     *state = b;
-    job->counts.blended += blended;
-    job->counts.tests += (uint64_t)i * PIXEL_LANES;
+    job->blended += blended;
 }
 
 /* Which blocks do the splats of a chunk reach, of those that are not done. */

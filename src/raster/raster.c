@@ -27,10 +27,10 @@ struct raster_state {
     tile_tape *tapes;
     uint16_t *blocks; /* see tile_job */
     float *records;
-    tile_counts *counts;
+    uint64_t *blended; /* per tile */
     float (*d_background)[3];
     size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity,
-        count_capacity, background_capacity;
+        blended_capacity, background_capacity;
     bool tape_kept;
 };
 
@@ -238,7 +238,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     look_behind(&job);
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
-    state->counts[index] = job.counts;
+    state->blended[index] = job.blended;
     mem_free(scratch.rows);
     mem_free(scratch.hits);
     mem_free(scratch.reached);
@@ -248,7 +248,7 @@ static gbt_status run_pass(pass *p, gbt_error *err)
 {
     struct raster_state *state = p->state;
     const size_t count = tile_count_of(&state->view);
-    GBT_TRY(mem_reserve((void **)&state->counts, &state->count_capacity, 0, count, sizeof *state->counts,
+    GBT_TRY(mem_reserve((void **)&state->blended, &state->blended_capacity, 0, count, sizeof *state->blended,
                         "raster tiles", err));
     GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count,
                         sizeof *state->d_background, "raster tiles", err));
@@ -267,10 +267,8 @@ static void add_counters(const struct raster_state *state, raster_counters *coun
     counters->pixels += (uint64_t)state->view.width * (uint64_t)state->view.height;
     counters->drawn += state->lists.splat_count;
     counters->pairs += state->lists.pair_count;
-    for (size_t i = 0; i < tile_count_of(&state->view); i++) {
-        counters->tests += state->counts[i].tests;
-        counters->blended += state->counts[i].blended;
-    }
+    for (size_t i = 0; i < tile_count_of(&state->view); i++)
+        counters->blended += state->blended[i];
 }
 
 gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera,
@@ -337,8 +335,8 @@ void raster_scene_free(raster_scene *scene)
     if (state == NULL)
         return;
     tile_lists_free(&state->lists);
-    void *const owned[] = {state->splats, state->rays,    state->drawn,  state->tapes,
-                           state->blocks, state->records, state->counts, state->d_background};
+    void *const owned[] = {state->splats, state->rays,    state->drawn,   state->tapes,
+                           state->blocks, state->records, state->blended, state->d_background};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     mem_free(state);

@@ -41,8 +41,8 @@ typedef struct raster_settings {
 raster_settings raster_settings_default(void);
 
 typedef struct raster_counters {
-    uint64_t pixels, drawn, pairs, tests,
-        blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and pixel; those blended */
+    uint64_t pixels, drawn, pairs, blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and
+                                               pixel, blended */
 } raster_counters;
 
 /** The last view and the memory of passes, reused from view to view. Start from {0}. */

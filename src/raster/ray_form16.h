@@ -153,7 +153,6 @@ static inline bool gather_rows(tile_job *job, int block, const block_rays *rays,
         const ray_response r =
             ray_respond(&job->rays[job->entries[e].splat], s->opacity, rays, settings->near);
         const vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(settings->alpha_min), r.raw), inside);
-        job->counts.tests += PIXEL_LANES;
         if (!vmask16_any(hit))
             continue;
         if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row),
@@ -248,7 +247,7 @@ static bool forward_rays(tile_job *job, ray_scratch *scratch)
         for (int lane = 0; lane < PIXEL_LANES; lane++) {
             float rgb[3], *T = &job->pixels->transmittance[block][lane];
             const size_t count = hits_of_ray(job, scratch, row_count, lane);
-            job->counts.blended += blend_ray(job, scratch, count, lane, rgb, T);
+            job->blended += blend_ray(job, scratch, count, lane, rgb, T);
             for (int c = 0; c < 3; c++)
                 job->pixels->rgb[block][c][lane] = fmaf(*T, job->pixels->background[block][c][lane], rgb[c]);
         }

@@ -24,13 +24,9 @@ typedef struct lab_bench_def {
     float alpha_max;  /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
     float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
                     a .ply */
-    float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to
-                           alpha_min. Default 0 */
-    gbt_preset preset;  /* the four numbers above win over it. Default GBT_PRESET_AS_TRAINED */
+    gbt_preset preset;  /* the three numbers above win over it. Default GBT_PRESET_AS_TRAINED */
     const char *kernel; /* "list" (default, and NULL), "tile", "single", "embree", or "splats" of the same; or
                            some of them, as "list,tile": measured in turn and compared with the first */
-    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
-                              traced again. Default 2^60 */
 } lab_bench_def;
 
 lab_bench_def lab_bench_def_default(void);

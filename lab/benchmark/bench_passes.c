@@ -125,7 +125,6 @@ static gbt_status prepare(passes *p, bench_way *ways, size_t count, gbt_error *e
     for (size_t i = 0; i < count; i++) {
         bench_way *w = &ways[i];
         w->traced.kernel = w->kernel;
-        w->traced.tape_bytes_max = w->tape_bytes_max;
         GBT_TRY(image_alloc(&w->rgb, p->rays->width, p->rays->height, 3, err));
         w->samples = mem_alloc((size_t)p->repeats, SAMPLE_COUNT * sizeof *w->samples, "timings", err);
         if (w->samples == NULL)

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 #include "data/scene.h"
 
@@ -93,9 +94,9 @@ bool scene_background(const scene *s, float color[3])
 {
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
-        int width, height, channels;
+        image_header header;
         if (view->is_test || view->alpha == SCENE_ALPHA_MASK ||
-            image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
+            image_header_read(view->path, &header, NULL) != GBT_OK || !header.has_alpha)
             continue;
         for (int c = 0; c < 3; c++)
             color[c] = view->alpha == SCENE_ALPHA_WHITE;

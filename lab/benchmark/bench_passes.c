@@ -87,9 +87,8 @@ static gbt_status forward(passes *p, bench_way *w, gbt_error *err)
 
 static gbt_status backward(passes *p, bench_way *w, gbt_error *err)
 {
-    return w->splat != NULL
-               ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, NULL, err)
-               : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err);
+    return w->splat != NULL ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, err)
+                            : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, err);
 }
 
 /* Build, forward, adjoint; `sample` counts from 0, and -1 is not kept. */

@@ -248,9 +248,9 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     GBT_TRY(mem_reserve((void **)&f->blend_weight, &f->blend_weight_capacity, 0, f->gaussians.count + 1,
                         sizeof *f->blend_weight, "weights", err));
     if (f->draw.renderer == GBT_RENDERER_TRACE)
-        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
+        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->blend_weight, err));
     else
-        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
+        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->blend_weight, err));
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);

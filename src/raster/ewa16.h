@@ -217,8 +217,6 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
 {
     (void)scratch;
     ewa_return state[TILE_BLOCKS];
-    vfloat16 background[3] = {vfloat16_set1(0), vfloat16_set1(0), vfloat16_set1(0)};
-    float sums[3];
     for (int block = 0; block < TILE_BLOCKS; block++) {
         ewa_return *b = &state[block];
         b->transmittance = vfloat16_load(job->tape->transmittance[block]);
@@ -228,12 +226,8 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
             b->d_rgb[c] = vfloat16_load(job->pixels->rgb[block][c]);
             b->behind =
                 vfloat16_fma(b->d_rgb[c], vfloat16_load(job->pixels->background[block][c]), b->behind);
-            background[c] = vfloat16_fma(b->transmittance, b->d_rgb[c], background[c]);
         }
     }
-    store_sums(background, 3, sums);
-    for (int c = 0; c < 3; c++)
-        job->d_background[c] += sums[c];
     for (size_t e = job->count; e-- > 0;) {
         const splat *s = &job->splats[job->entries[e].splat];
         float *record = job->records + (size_t)job->entries[e].pair * EWA_SUMS, at[2];

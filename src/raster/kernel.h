@@ -104,11 +104,10 @@ typedef struct tile_job {
     size_t count;
     int x0, y0; /* first pixel */
     tile_pixels *pixels;
-    tile_tape *tape;     /* forward: NULL when no adjoint will follow */
-    uint16_t *blocks;    /* EWA, [count]: bit per block in which the entry was blended; NULL with the tape */
-    float *records;      /* backward, [pairs][sums]: those of this tile's entries are written */
-    float *d_background; /* backward, [3], added to */
-    uint64_t blended;    /* pairs of Gaussian and pixel, added to */
+    tile_tape *tape;  /* forward: NULL when no adjoint will follow */
+    uint16_t *blocks; /* EWA, [count]: bit per block in which the entry was blended; NULL with the tape */
+    float *records;   /* backward, [pairs][sums]: those of this tile's entries are written */
+    uint64_t blended; /* pairs of Gaussian and pixel, added to */
 } tile_job;
 
 typedef struct raster_kernel {

@@ -28,9 +28,8 @@ struct raster_state {
     uint16_t *blocks; /* see tile_job */
     float *records;
     uint64_t *blended; /* per tile */
-    float (*d_background)[3];
     size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity,
-        blended_capacity, background_capacity;
+        blended_capacity;
     bool tape_kept;
 };
 
@@ -222,7 +221,6 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     ray_scratch scratch = {0};
     if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p))
         return;
-    memset(state->d_background[index], 0, sizeof *state->d_background);
     tile_job job = {.view = &state->view,
                     .splats = state->splats,
                     .rays = state->rays,
@@ -233,8 +231,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
                     .pixels = &pixels,
                     .tape = tape ? &state->tapes[index] : NULL,
                     .blocks = tape ? state->blocks + first : NULL,
-                    .records = state->records,
-                    .d_background = state->d_background[index]};
+                    .records = state->records};
     look_behind(&job);
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
@@ -250,8 +247,6 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     const size_t count = tile_count_of(&state->view);
     GBT_TRY(mem_reserve((void **)&state->blended, &state->blended_capacity, 0, count, sizeof *state->blended,
                         "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count,
-                        sizeof *state->d_background, "raster tiles", err));
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
     if (is_stopped(p))
@@ -306,7 +301,7 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
 }
 
 gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,
-                           float d_background[3], gbt_error *err)
+                           gbt_error *err)
 {
     struct raster_state *state = scene->state;
     if (state == NULL || !state->tape_kept)
@@ -320,11 +315,6 @@ gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d
                         "raster gradients", err));
     pass p = {.state = state, .d_rgb = d_rgb, .stop = scene->stop};
     GBT_TRY(run_pass(&p, err));
-    for (int c = 0; c < 3 && d_background != NULL; c++) {
-        d_background[c] = 0;
-        for (size_t i = 0; i < tile_count_of(view); i++)
-            d_background[c] += state->d_background[i][c];
-    }
     return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records,
                             d_gaussians, weight, err);
 }
@@ -335,8 +325,8 @@ void raster_scene_free(raster_scene *scene)
     if (state == NULL)
         return;
     tile_lists_free(&state->lists);
-    void *const owned[] = {state->splats, state->rays,    state->drawn,   state->tapes,
-                           state->blocks, state->records, state->blended, state->d_background};
+    void *const owned[] = {state->splats, state->rays,    state->drawn,  state->tapes,
+                           state->blocks, state->records, state->blended};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     mem_free(state);

@@ -262,10 +262,8 @@ static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_co
     float rgb[3], T, behind = 0;
     const size_t count = hits_of_ray(job, scratch, row_count, lane),
                  blended = blend_ray(job, scratch, count, lane, rgb, &T);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
         behind = fmaf(d_rgb[c], job->pixels->background[block][c][lane], behind);
-        job->d_background[c] += T * d_rgb[c];
-    }
     for (size_t i = 0; i < row_count; i++)
         scratch->rows[i].t[lane] = 0;
     for (size_t i = count; i-- > 0;) {

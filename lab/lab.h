@@ -24,13 +24,9 @@ typedef struct lab_bench_def {
     float alpha_max;  /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
     float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
                     a .ply */
-    float proxy_radius; /* a Gaussian ends at this many std-devs, > 0; 0 or NaN: where its response falls to
-                           alpha_min. Default 0 */
-    gbt_preset preset;  /* the four numbers above win over it. Default GBT_PRESET_AS_TRAINED */
+    gbt_preset preset;  /* the three numbers above win over it. Default GBT_PRESET_AS_TRAINED */
     const char *kernel; /* "list" (default, and NULL), "tile", "single", "embree", or "splats" of the same; or
                            some of them, as "list,tile": measured in turn and compared with the first */
-    size_t tape_bytes_max; /* memory for the hits that forward keeps for the adjoint; what goes beyond is
-                              traced again. Default 2^60 */
 } lab_bench_def;
 
 lab_bench_def lab_bench_def_default(void);
@@ -152,20 +148,23 @@ gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err);
    the table. SIGINT and SIGTERM end the study after the current step with GBT_ERR_INTERRUPTED; the same call
    goes on with the run that was interrupted, from its start. */
 
-typedef struct lab_paper_def {
+typedef struct lab_runs_def {
     const char *const *data; /* data set folders, the last parts of their paths distinct */
     size_t data_count;       /* 1 to 16 */
-    uint64_t iterations;     /* of every run, at least 20. Default 3000; the paper's is 30000 */
     double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
-    int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 3 */
-    const char *eval_split;  /* gbt_train_def.eval_split of the runs. Default "every=8" */
-    gbt_renderer renderer;   /* that trains. Default GBT_RENDERER_RASTER, as the paper */
-    const char *tables;      /* which, as "1,3". Default "1,2,3,4" */
-    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such column.
-                          Default NULL */
-} lab_paper_def;
+    int seeds;               /* runs of each variant, seeds 0, 1, ...; [1, 10]. Default 0: 3, of "time" 1 */
+    const char *eval_split;  /* gbt_train_def.eval_split of the runs. Default NULL: "every=8" of "paper", else
+                                "auto" */
+    uint64_t iterations;   /* "paper" and "anchors": of every run, at least 20. Default 0: 3000 and 1000; the
+                              paper's is 30000 */
+    double budget_seconds; /* "time": of a run, (0, 1e6]. Default 84 */
+    gbt_renderer renderer; /* "paper": that trains. Default GBT_RENDERER_RASTER, as the paper */
+    const char *tables;    /* "paper": which, as "1,3". Default "1,2,3,4" */
+    const char *lpips; /* "paper": .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such
+                          column. Default NULL */
+} lab_runs_def;
 
-lab_paper_def lab_paper_def_default(void);
+lab_runs_def lab_runs_def_default(void);
 
 /**
  * The paper's four tables by its own protocol (`compat`): voxels against balls, what each part of the method
@@ -177,18 +176,7 @@ lab_paper_def lab_paper_def_default(void);
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  * Cost: up to 13 runs per scene and seed; a few gigabytes for models.
  */
-gbt_status lab_study_paper(const lab_paper_def *def, const char *folder, FILE *out, gbt_error *err);
-
-typedef struct lab_time_def {
-    const char *const *data; /* as above */
-    size_t data_count;       /* 1 to 16 */
-    double budget_seconds;   /* of a run, (0, 1e6]. Default 84 */
-    double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
-    int seeds;               /* [1, 10]. Default 1 */
-    const char *eval_split;  /* as above. Default "auto" */
-} lab_time_def;
-
-lab_time_def lab_time_def_default(void);
+gbt_status lab_study_paper(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
  * Held-out PSNR against seconds: the default settings against the faithful protocol, which is given five
@@ -200,18 +188,7 @@ lab_time_def lab_time_def_default(void);
  * @return as lab_study_paper()
  * Cost: about fifteen budgets per scene and seed. Nothing else should run meanwhile.
  */
-gbt_status lab_study_time(const lab_time_def *def, const char *folder, FILE *out, gbt_error *err);
-
-typedef struct lab_anchors_def {
-    const char *const *data; /* as above */
-    size_t data_count;       /* 1 to 16 */
-    uint64_t iterations;     /* of every run, at least 20. Default 1000 */
-    double downscale;        /* photos are divided by this, [1, 64]. Default 1 */
-    int seeds;               /* runs of each variant, [1, 10]. Default 3 */
-    const char *eval_split;  /* as above. Default "auto" */
-} lab_anchors_def;
-
-lab_anchors_def lab_anchors_def_default(void);
+gbt_status lab_study_time(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
  * What a scene needs: the default settings with anchors that start at voxels, at the paper's balls, at
@@ -223,6 +200,6 @@ lab_anchors_def lab_anchors_def_default(void);
  * @return as lab_study_paper()
  * Cost: eight runs per scene and seed. What else runs meanwhile changes nothing but the time.
  */
-gbt_status lab_study_anchors(const lab_anchors_def *def, const char *folder, FILE *out, gbt_error *err);
+gbt_status lab_study_anchors(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err);
 
 #endif

@@ -50,8 +50,6 @@ typedef struct gbt_train_def {
     gbt_alpha alpha;        /* black and white are also the background */
     gbt_background background;
     uint64_t seed;
-    size_t hit_bytes_max; /* memory for the hits of a view that are kept for the adjoint; tiles beyond are
-                             traced again, to the same bits. [0, 2^60], default 2^60 */
     size_t memory; /* bytes that the program may take, docs/memory.md; the result does not depend on it. 0,
                       the default: no limit */
     uint64_t max_anchors;      /* growth stops there */
@@ -74,7 +72,6 @@ typedef struct gbt_train_def {
                             1 with compat */
     double learning_rate_factor; /* of all learning rates */
     double save_every_seconds;   /* wall time between checkpoints; 0: only at the end */
-    uint64_t save_at_step;       /* one extra checkpoint right after this step; 0: none */
     uint64_t stop_at_step;       /* stop, as a signal would, after this step; 0: never */
     bool tensorboard;            /* also write `run`/events.out.tfevents.0.train: scalars of log.csv */
     bool resume;    /* go on from the run's last checkpoint, with its settings. Other `iterations`, or another

@@ -87,9 +87,8 @@ static gbt_status forward(passes *p, bench_way *w, gbt_error *err)
 
 static gbt_status backward(passes *p, bench_way *w, gbt_error *err)
 {
-    return w->splat != NULL
-               ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, NULL, err)
-               : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err);
+    return w->splat != NULL ? raster_backward(&w->splatted, &p->d_rgb, &p->d_gaussians, NULL, err)
+                            : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, err);
 }
 
 /* Build, forward, adjoint; `sample` counts from 0, and -1 is not kept. */
@@ -125,7 +124,6 @@ static gbt_status prepare(passes *p, bench_way *ways, size_t count, gbt_error *e
     for (size_t i = 0; i < count; i++) {
         bench_way *w = &ways[i];
         w->traced.kernel = w->kernel;
-        w->traced.tape_bytes_max = w->tape_bytes_max;
         GBT_TRY(image_alloc(&w->rgb, p->rays->width, p->rays->height, 3, err));
         w->samples = mem_alloc((size_t)p->repeats, SAMPLE_COUNT * sizeof *w->samples, "timings", err);
         if (w->samples == NULL)

@@ -29,7 +29,6 @@ typedef struct bench_way {
     trace_kernel kernel;
     cpu_isa isa;
     trace_settings settings;
-    size_t tape_bytes_max;
     const bench_splat *splat; /* NULL: traced */
     bench_figures figures;
     image rgb;          /* of the last pass */

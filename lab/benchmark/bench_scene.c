@@ -91,8 +91,8 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
     if (s->run != NULL) {
-        GBT_TRY(frame_render_shot(&s->run->frame, loaded_run_subject(s->run), &s->camera.shot, &s->settings,
-                                  err));
+        GBT_TRY(frame_render_with(&s->run->frame, loaded_run_subject(s->run), &s->camera.shot, &s->settings,
+                                  NULL, err));
         s->gaussians = frame_drawn(&s->run->frame);
     }
     return ray_image_from_shot(&s->camera.shot, 0, &s->rays, err);

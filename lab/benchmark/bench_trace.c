@@ -17,18 +17,17 @@ enum { KERNELS_MAX = BENCH_KERNELS };
 
 lab_bench_def lab_bench_def_default(void)
 {
-    return (lab_bench_def){
-        .repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list", .tape_bytes_max = (size_t)1 << 60};
+    return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list"};
 }
 
 /* What the caller has given in place of the model's own. */
-static gbt_status override_setting(const char *name, float given, float high, float *setting, gbt_error *err)
+static gbt_status override_setting(const char *name, float given, float *setting, gbt_error *err)
 {
     if (isnan(given) || given == 0)
         return GBT_OK;
-    if (!(given > 0 && given < high))
-        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, %g), got %g)", name,
-                         (double)high, (double)given);
+    if (!(given > 0 && given < 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, 1), got %g)", name,
+                         (double)given);
     *setting = given;
     return GBT_OK;
 }
@@ -36,10 +35,9 @@ static gbt_status override_setting(const char *name, float given, float high, fl
 static gbt_status override_settings(const lab_bench_def *def, trace_settings *settings, gbt_error *err)
 {
     GBT_TRY(loaded_run_preset(def->preset, settings, err));
-    GBT_TRY(override_setting("alpha_min", def->alpha_min, 1, &settings->alpha_min, err));
-    GBT_TRY(override_setting("alpha_max", def->alpha_max, 1, &settings->alpha_max, err));
-    GBT_TRY(override_setting("t_min", def->t_min, 1, &settings->transmittance_min, err));
-    return override_setting("proxy_radius", def->proxy_radius, INFINITY, &settings->proxy_radius, err);
+    GBT_TRY(override_setting("alpha_min", def->alpha_min, &settings->alpha_min, err));
+    GBT_TRY(override_setting("alpha_max", def->alpha_max, &settings->alpha_max, err));
+    return override_setting("t_min", def->t_min, &settings->transmittance_min, err);
 }
 
 /* ---- figures: one table for the text and for the file ---- */
@@ -104,9 +102,8 @@ static void print_head(const measured *m, FILE *out)
     for (size_t k = 0; k < m->count; k++)
         if (m->kernel[k] == TRACE_LIST && !m->ways[k].traced.listed)
             fputs("list: these rays walk the tree\n", out);
-    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g, proxy radius %g; medians of %d\n\n",
-            (double)s->settings.alpha_min, (double)s->settings.alpha_max,
-            (double)s->settings.transmittance_min, (double)s->settings.proxy_radius, m->def->repeats);
+    fprintf(out, "alpha_min %g, alpha_max %g, T_min %g; medians of %d\n\n", (double)s->settings.alpha_min,
+            (double)s->settings.alpha_max, (double)s->settings.transmittance_min, m->def->repeats);
 }
 
 /* One column per kernel; of the others, how often the first's is in it. */
@@ -167,12 +164,11 @@ static json_t *way_to_json(const measured *m, size_t way)
 static gbt_status save_figures(const measured *m, gbt_error *err)
 {
     const trace_settings *s = &m->scene->settings;
-    json_t *root = json_pack(
-        "{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f,s:o}", "schema", 2, "model", json_text(m->def->model), "rays",
-        (json_int_t)ray_image_count(&m->scene->rays), "gaussians", (json_int_t)m->scene->gaussians->count,
-        "threads", parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max", (double)s->alpha_max,
-        "transmittance_min", (double)s->transmittance_min, "proxy_radius",
-        isfinite(s->proxy_radius) ? json_real((double)s->proxy_radius) : json_null());
+    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f}", "schema", 2, "model",
+                             json_text(m->def->model), "rays", (json_int_t)ray_image_count(&m->scene->rays),
+                             "gaussians", (json_int_t)m->scene->gaussians->count, "threads",
+                             parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max",
+                             (double)s->alpha_max, "transmittance_min", (double)s->transmittance_min);
     json_t *kernels = json_array();
     for (size_t k = 0; k < m->count; k++)
         json_array_append_new(kernels, way_to_json(m, k));
@@ -206,7 +202,6 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
     for (size_t k = 0; k < m->count; k++) {
         m->ways[k].isa = cpu_best_isa();
         m->ways[k].settings = traced->settings;
-        m->ways[k].tape_bytes_max = def->tape_bytes_max > 0 ? def->tape_bytes_max : 1;
         m->ways[k].settings.packet_order = m->kernel[k] == BENCH_PACKET_ORDER;
         if (m->kernel[k] == BENCH_SPLATS)
             m->ways[k].splat = &m->splat;

@@ -65,17 +65,14 @@ static gbt_status find_other_colours(grad_checker *c, const raster_reference *sp
    zero before. */
 static gbt_status renderer_in_double(grad_checker *c, const raster_reference *splats,
                                      const raster_settings *settings, const double *d_rgb, double *wanted,
-                                     double d_background[3], gbt_error *err)
+                                     gbt_error *err)
 {
     if (c->frame->draw.renderer == GBT_RENDERER_RASTER)
-        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, d_background,
-                                         err);
-    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted,
-                                    d_background, err);
+        return raster_reference_backward(splats, &c->frame->camera, settings, d_rgb, wanted, err);
+    return reference_scene_backward(&c->scene, &c->run->settings, &c->frame->rays, d_rgb, NULL, wanted, err);
 }
 
-static void print_renderer(grad_checker *c, const char *stage, const double *wanted,
-                           const float d_background[3], const double d_background_wanted[3])
+static void print_renderer(grad_checker *c, const char *stage, const double *wanted)
 {
     static const char *const names[] = {"mean", "scale", "rotation", "opacity", "colour"};
     static const size_t first[] = {REFERENCE_mean_x,  REFERENCE_scale_x, REFERENCE_quat_w,
@@ -89,10 +86,6 @@ static void print_renderer(grad_checker *c, const char *stage, const double *wan
                 grad_difference_add(&d, (double)got[f][i], wanted[f * c->scene.count + i]);
         grad_print_row(c, stage, names[class], grad_difference_relative(&d), renderer_limit);
     }
-    grad_difference d = {0};
-    for (int k = 0; k < 3; k++)
-        grad_difference_add(&d, (double)d_background[k], d_background_wanted[k]);
-    grad_print_row(c, stage, "background", grad_difference_relative(&d), renderer_limit);
 }
 
 static gbt_status check_renderer(grad_checker *c, gbt_renderer renderer, const char *stage, gbt_error *err)
@@ -108,8 +101,6 @@ static gbt_status check_renderer(grad_checker *c, gbt_renderer renderer, const c
     double *d_rgb = mem_alloc(c->ray_count, 3 * sizeof *d_rgb, "check gradient", err);
     double *wanted =
         mem_calloc(c->scene.count, GAUSSIANS_FIELD_COUNT * sizeof *wanted, "check gradient", err);
-    double d_background_wanted[3] = {0};
-    float d_background[3];
     size_t left_out = 0;
     gbt_status status = in_band == NULL || d_rgb == NULL || wanted == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
@@ -121,15 +112,13 @@ static gbt_status check_renderer(grad_checker *c, gbt_renderer renderer, const c
         d_rgb[i] = (double)c->d_masked.pixels[i];
     }
     if (status == GBT_OK)
-        status =
-            renderer == GBT_RENDERER_TRACE
-                ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, d_background,
-                                 err)
-                : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, d_background, err);
+        status = renderer == GBT_RENDERER_TRACE
+                     ? trace_backward(&f->scene, &f->rays, &c->d_masked, &c->d_gaussians, c->weight, err)
+                     : raster_backward(&f->splats, &c->d_masked, &c->d_gaussians, c->weight, err);
     if (status == GBT_OK)
-        status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, d_background_wanted, err);
+        status = renderer_in_double(c, &splats, &settings, d_rgb, wanted, err);
     if (status == GBT_OK) {
-        print_renderer(c, stage, wanted, d_background, d_background_wanted);
+        print_renderer(c, stage, wanted);
         fprintf(c->out, "%s: %zu of %zu rays are left out: rounding may change what they blend\n", stage,
                 left_out, c->ray_count);
         if (10 * left_out > 9 * c->ray_count)

@@ -286,13 +286,11 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
 
 static void pixel_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l,
                            const raster_settings *s, const flat *all, size_t count, int x, int y,
-                           const double d_rgb[3], double *d_fields, double d_background[3])
+                           const double d_rgb[3], double *d_fields)
 {
     double rgb[3], T, behind[3] = {0};
     look_behind(camera, s, x, y, behind);
     const size_t n = scene->count, passed = blend(scene, s, all, count, x, y, behind, rgb, &T);
-    for (int c = 0; c < 3; c++)
-        d_background[c] += T * d_rgb[c];
     for (size_t i = passed; i-- > 0;) {
         const double raw = response(scene, s, &all[i], x, y), alpha = fmin((double)s->alpha_max, raw);
         if (raw == 0)
@@ -314,7 +312,7 @@ static void pixel_backward(const raster_reference *scene, const gbt_camera *came
 
 gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera,
                                      const raster_settings *settings, const double *d_rgb, double *d_fields,
-                                     double d_background[3], gbt_error *err)
+                                     gbt_error *err)
 {
     lens l;
     flat *all = NULL;
@@ -323,8 +321,7 @@ gbt_status raster_reference_backward(const raster_reference *scene, const gbt_ca
     for (int y = 0; y < camera->height && status == GBT_OK; y++)
         for (int x = 0; x < camera->width; x++)
             pixel_backward(scene, camera, &l, settings, all, count, x, y,
-                           d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x), d_fields,
-                           d_background);
+                           d_rgb + 3 * ((size_t)y * (size_t)camera->width + (size_t)x), d_fields);
     mem_free(all);
     return status;
 }

@@ -44,10 +44,10 @@ gbt_status raster_reference_make(const gaussians *g, raster_reference *out, gbt_
 gbt_status raster_reference_forward(const raster_reference *scene, const gbt_camera *camera,
                                     const raster_settings *settings, int step, double *rgb, gbt_error *err);
 
-/** Adjoint with step 1: adds dL/dfield (scales linear, quaternion tangent) and dL/dbackground. One thread. */
+/** Adjoint with step 1: adds dL/dfield (scales linear, quaternion tangent). One thread. */
 gbt_status raster_reference_backward(const raster_reference *scene, const gbt_camera *camera,
                                      const raster_settings *settings, const double *d_rgb, double *d_fields,
-                                     double d_background[3], gbt_error *err);
+                                     gbt_error *err);
 
 /** Pixels that raster_reference_forward() computes. */
 static inline size_t raster_reference_pixels(const gbt_camera *camera, int step)

@@ -60,7 +60,7 @@ static void trace_gradient(stability *s, const gaussians *g, const trace_setting
     if (s->status == GBT_OK &&
         stability_ok(s, trace_build(&traced, g, settings, ray_image_reach(rays), s->err)) &&
         stability_ok(s, trace_forward(&traced, rays, true, &(trace_outputs){.rgb = &rgb}, NULL, s->err)))
-        stability_ok(s, trace_backward(&traced, rays, &ones, d_gaussians, NULL, NULL, s->err));
+        stability_ok(s, trace_backward(&traced, rays, &ones, d_gaussians, NULL, s->err));
     trace_scene_free(&traced);
     image_free(&rgb);
     image_free(&ones);

@@ -141,7 +141,7 @@ static void try_poison(stability *s, poisoning *p, const gaussians *g, const cha
         return;
     p->tries++;
     p->bad_pixels += draw_count_bad(p->rgb.pixels, values);
-    if (!stability_ok(s, trace_backward(&p->traced, &p->rays, &p->d_rgb, d, NULL, NULL, s->err)))
+    if (!stability_ok(s, trace_backward(&p->traced, &p->rays, &p->d_rgb, d, NULL, s->err)))
         return;
     const size_t bad = draw_count_bad_fields(d);
     if (fabsf(value) > 1e37f && isfinite(value) && is_color(field))

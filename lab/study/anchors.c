@@ -4,11 +4,6 @@
 
 #include "base/fail.h"
 
-lab_anchors_def lab_anchors_def_default(void)
-{
-    return (lab_anchors_def){.iterations = 1000, .downscale = 1, .seeds = 3, .eval_split = "auto"};
-}
-
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
                           study_figures *out, gbt_error *err)
 {
@@ -25,12 +20,12 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
                                  out, err);
 }
 
-gbt_status lab_study_anchors(const lab_anchors_def *def, const char *folder, FILE *out, gbt_error *err)
+gbt_status lab_study_anchors(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    anchors_study s = {.def = *def};
-    if (def->iterations < 20)
+    anchors_study s = {.def = study_grid_def(def, 3, "auto", 1000)};
+    if (s.def.iterations < 20)
         return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least 20)",
-                         (unsigned long long)def->iterations);
-    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, anchors_variant_count, def->seeds, err));
+                         (unsigned long long)s.def.iterations);
+    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, anchors_variant_count, s.def.seeds, err));
     return study_grid_report(&s.grid, NULL, run_one, &anchors_output, &s, folder, out, err);
 }

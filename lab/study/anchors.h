@@ -24,7 +24,7 @@ extern const anchors_variant anchors_variants[];
 extern const size_t anchors_variant_count;
 
 typedef struct anchors_study {
-    lab_anchors_def def; /* borrowed */
+    lab_runs_def def; /* borrowed */
     study_grid grid;
 } anchors_study;
 

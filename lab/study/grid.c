@@ -10,6 +10,21 @@
 #include "base/memory.h"
 #include "cluster/cluster.h"
 
+lab_runs_def lab_runs_def_default(void)
+{
+    return (lab_runs_def){
+        .downscale = 1, .budget_seconds = 84, .renderer = GBT_RENDERER_RASTER, .tables = "1,2,3,4"};
+}
+
+lab_runs_def study_grid_def(const lab_runs_def *def, int seeds, const char *eval_split, uint64_t iterations)
+{
+    lab_runs_def whole = *def;
+    whole.seeds = def->seeds == 0 ? seeds : def->seeds;
+    whole.eval_split = def->eval_split == NULL ? eval_split : def->eval_split;
+    whole.iterations = def->iterations == 0 ? iterations : def->iterations;
+    return whole;
+}
+
 gbt_status study_grid_open(study_grid *g, const char *const *data, size_t data_count, size_t variant_count,
                            int seeds, gbt_error *err)
 {

@@ -3,6 +3,7 @@
 #ifndef GBT_STUDY_GRID_H
 #define GBT_STUDY_GRID_H
 
+#include "lab/lab.h"
 #include "study/output.h"
 #include "study/runs.h"
 
@@ -12,6 +13,9 @@ typedef struct study_grid {
     char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE];
     study_figures *figures; /* [scene][variant][seed], owned; read them by study_grid_at() */
 } study_grid;
+
+/** `def` with a study's own values where it has none. */
+lab_runs_def study_grid_def(const lab_runs_def *def, int seeds, const char *eval_split, uint64_t iterations);
 
 /**
  * A grid without figures. Close it with study_grid_close(), also after a failure.

@@ -9,16 +9,6 @@
 
 enum { LEAST_ITERATIONS = 20 };
 
-lab_paper_def lab_paper_def_default(void)
-{
-    return (lab_paper_def){.iterations = 3000,
-                           .downscale = 1,
-                           .seeds = 3,
-                           .eval_split = "every=8",
-                           .renderer = GBT_RENDERER_RASTER,
-                           .tables = "1,2,3,4"};
-}
-
 /* "1,3": digits of tables, each once, with commas between. */
 static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 1], gbt_error *err)
 {
@@ -33,8 +23,9 @@ static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 
 }
 
 /* Which tables and variants, and what the scenes say. */
-static gbt_status plan(paper_study *s, const lab_paper_def *def, gbt_error *err)
+static gbt_status plan(paper_study *s, gbt_error *err)
 {
+    const lab_runs_def *def = &s->def;
     if (def->iterations < LEAST_ITERATIONS)
         return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least %d)",
                          (unsigned long long)def->iterations, (int)LEAST_ITERATIONS);
@@ -82,11 +73,11 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     return study_runs_do(s->def.data[scene], run, &def, s->def.lpips, out, err);
 }
 
-gbt_status lab_study_paper(const lab_paper_def *def, const char *folder, FILE *out, gbt_error *err)
+gbt_status lab_study_paper(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    paper_study s = {.def = *def};
-    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, PAPER_VARIANTS, def->seeds, err));
-    const gbt_status status = plan(&s, def, err);
+    paper_study s = {.def = study_grid_def(def, 3, "every=8", 3000)};
+    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, PAPER_VARIANTS, s.def.seeds, err));
+    const gbt_status status = plan(&s, err);
     if (status == GBT_OK)
         return study_grid_report(&s.grid, s.has_variant, run_one, &paper_output, &s, folder, out, err);
     study_grid_close(&s.grid);

@@ -64,7 +64,7 @@ gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err);
 double paper_ball_count(double points, int max_depth);
 
 typedef struct paper_study {
-    lab_paper_def def;                /* strings borrowed */
+    lab_runs_def def;                 /* strings borrowed */
     bool has_table[PAPER_TABLES + 1]; /* by number */
     bool has_variant[PAPER_VARIANTS];
     paper_scene scenes[STUDY_SCENES_MAX];

@@ -8,6 +8,7 @@
 #include "gbtrace/compress.h"
 #include "study/chart.h"
 #include "study/rate.h"
+#include "study/runs_stat.h"
 
 /* What a coded model should keep to: a twelfth of a baseline with 1 / 0.7 as many anchors of 316 bytes, and
    what nobody sees. */
@@ -71,13 +72,11 @@ static void add_csv(const void *of, text *out)
         for (size_t j = 0; j < m->row_count; j++) {
             const rate_row *r = &m->rows[j];
             const model_sizes *s = &r->sizes;
-            text_add(out, "\"");
-            for (const char *c = m->name; *c != '\0'; c++)
-                text_format(out, *c == '"' ? "\"\"" : "%c", *c);
-            text_format(out, "\",%g,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n",
-                        r->quality, m->anchors, s->total, s->positions, s->features, s->offsets, s->scales,
-                        s->pixels, s->steps, s->networks, r->psnr, r->ssim, m->psnr - r->psnr,
-                        r->encode_seconds, r->decode_seconds);
+            stat_csv_text(out, m->name);
+            text_format(out, ",%g,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n", r->quality,
+                        m->anchors, s->total, s->positions, s->features, s->offsets, s->scales, s->pixels,
+                        s->steps, s->networks, r->psnr, r->ssim, m->psnr - r->psnr, r->encode_seconds,
+                        r->decode_seconds);
         }
     }
 }

@@ -9,6 +9,7 @@
 #include "report/plot.h"
 #include "report/style.h"
 #include "study/chart.h"
+#include "study/runs_stat.h"
 #include "study/speed.h"
 
 enum { PANEL_GAP = 18 };
@@ -63,14 +64,6 @@ static void add_tables(const void *of, text *out)
     }
 }
 
-static void add_csv_text(text *out, const char *value)
-{
-    text_add(out, "\"");
-    for (; *value != '\0'; value++)
-        text_format(out, *value == '"' ? "\"\"" : "%c", *value);
-    text_add(out, "\"");
-}
-
 static void add_csv(const void *of, text *out)
 {
     const speed_study *study = of;
@@ -81,7 +74,7 @@ static void add_csv(const void *of, text *out)
         const speed_model *model = &study->models[m];
         for (size_t i = 0; i < model->row_count; i++) {
             const speed_row *r = &model->rows[i];
-            add_csv_text(out, model->name);
+            stat_csv_text(out, model->name);
             text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
                         knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
                         cpu_isa_name(r->isa), (double)r->settings.alpha_min,
@@ -90,7 +83,7 @@ static void add_csv(const void *of, text *out)
                         r->error.max, r->photo_psnr);
         }
         for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            add_csv_text(out, model->name);
+            stat_csv_text(out, model->name);
             text_format(out, ",not built,%s,,,,,,,,,,,%.6g,%.6g,\n", model->ideas[i].name,
                         model->ideas[i].error.psnr, model->ideas[i].error.max);
         }

@@ -4,11 +4,6 @@
 
 #include "base/fail.h"
 
-lab_time_def lab_time_def_default(void)
-{
-    return (lab_time_def){.budget_seconds = 84, .downscale = 1, .seeds = 1, .eval_split = "auto"};
-}
-
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
                           study_figures *out, gbt_error *err)
 {
@@ -28,12 +23,12 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
                                  out, err);
 }
 
-gbt_status lab_study_time(const lab_time_def *def, const char *folder, FILE *out, gbt_error *err)
+gbt_status lab_study_time(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    time_study s = {.def = *def};
+    time_study s = {.def = study_grid_def(def, 1, "auto", 0)};
     if (!(def->budget_seconds > 0 && def->budget_seconds <= 1e6))
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0, up to 1e6)",
                          def->budget_seconds);
-    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, time_variant_count, def->seeds, err));
+    GBT_TRY(study_grid_open(&s.grid, def->data, def->data_count, time_variant_count, s.def.seeds, err));
     return study_grid_report(&s.grid, NULL, run_one, &time_output, &s, folder, out, err);
 }

@@ -25,7 +25,7 @@ extern const time_variant time_variants[];
 extern const size_t time_variant_count;
 
 typedef struct time_study {
-    lab_time_def def; /* borrowed */
+    lab_runs_def def; /* borrowed */
     study_grid grid;
 } time_study;
 

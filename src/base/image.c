@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/image_header.h"
 #include "base/memory.h"
 
 gbt_status image_alloc(image *out, int width, int height, int channels, gbt_error *err)
@@ -36,15 +35,4 @@ void image_free(image *im)
 {
     mem_free(im->pixels);
     memset(im, 0, sizeof *im);
-}
-
-gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err)
-{
-    image_header header;
-    *width = *height = *channels = 0;
-    GBT_TRY(image_header_read(path, &header, err));
-    *width = header.width;
-    *height = header.height;
-    *channels = header.has_alpha ? 4 : 3;
-    return GBT_OK;
 }

@@ -25,10 +25,6 @@ void image_free(image *im); /* zeroes the struct */
 /** Make `im` of that size, unless it is: what it held is lost then. Start from {0}. */
 gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *err);
 
-/** Size of an image file without reading its pixels, and the channels that image_read() would give
-    (image_header_read() says more). */
-gbt_status image_probe(const char *path, int *width, int *height, int *channels, gbt_error *err);
-
 /**
  * Read a PNG, JPEG or EXR file.
  *

@@ -20,7 +20,7 @@ typedef enum image_kind { IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR } image_kind;
 typedef struct image_header {
     image_kind kind;
     int width, height;
-    bool has_alpha;
+    bool has_alpha;  /* image_read() gives 4 channels, else 3 */
     int orientation; /* EXIF: 1 as stored, 3 upside down, 6 and 8 on a side, ...; 1 when there is none */
 } image_header;
 

@@ -11,9 +11,7 @@
 typedef struct study_request {
     lab_study_def def; /* of the studies of models */
     lab_stability_def stability;
-    lab_paper_def paper;
-    lab_time_def time;
-    lab_anchors_def anchors;
+    lab_runs_def runs; /* of those that train */
     const char *folder;
 } study_request;
 
@@ -39,17 +37,17 @@ static gbt_status run_stability(const study_request *r, gbt_error *err)
 
 static gbt_status run_paper(const study_request *r, gbt_error *err)
 {
-    return lab_study_paper(&r->paper, r->folder, stdout, err);
+    return lab_study_paper(&r->runs, r->folder, stdout, err);
 }
 
 static gbt_status run_time(const study_request *r, gbt_error *err)
 {
-    return lab_study_time(&r->time, r->folder, stdout, err);
+    return lab_study_time(&r->runs, r->folder, stdout, err);
 }
 
 static gbt_status run_anchors(const study_request *r, gbt_error *err)
 {
-    return lab_study_anchors(&r->anchors, r->folder, stdout, err);
+    return lab_study_anchors(&r->runs, r->folder, stdout, err);
 }
 
 enum { STUDY_COUNT = 7 };
@@ -75,18 +73,12 @@ static const struct {
 static const command_word *words_of_studies(void) { return study_words; }
 
 static study_request request;
-static int seeds;
-static double downscale = 1;
-static uint64_t iterations;
-static const char *eval_split;
 
 static const option *options(int *count)
 {
     request = (study_request){.def = lab_study_def_default(),
                               .stability = lab_stability_def_default(),
-                              .paper = lab_paper_def_default(),
-                              .time = lab_time_def_default(),
-                              .anchors = lab_anchors_def_default()};
+                              .runs = lab_runs_def_default()};
     static const option rows[] = {
         {.name = "output",
          .short_name = 'o',
@@ -126,7 +118,7 @@ static const option *options(int *count)
         {.name = "iterations",
          .of = "paper anchors",
          .kind = OPTION_UINT64,
-         .value = &iterations,
+         .value = &request.runs.iterations,
          .min = 0,
          .max = 1e9,
          .value_name = "N",
@@ -135,13 +127,13 @@ static const option *options(int *count)
         {.name = "renderer",
          .of = "paper",
          .kind = OPTION_CHOICE,
-         .value = &request.paper.renderer,
+         .value = &request.runs.renderer,
          .choices = GBT_RENDERER_TRAINING_NAMES,
          .help = "renderer of the runs"},
         {.name = "tables",
          .of = "paper",
          .kind = OPTION_STRING,
-         .value = &request.paper.tables,
+         .value = &request.runs.tables,
          .value_name = "1,3",
          .choices = "1|2|3|4",
          .list = true,
@@ -150,13 +142,13 @@ static const option *options(int *count)
         {.name = "lpips",
          .of = "paper",
          .kind = OPTION_STRING,
-         .value = &request.paper.lpips,
+         .value = &request.runs.lpips,
          .value_name = "FILE",
          .help = LPIPS_HELP},
         {.name = "budget",
          .of = "time",
          .kind = OPTION_DURATION,
-         .value = &request.time.budget_seconds,
+         .value = &request.runs.budget_seconds,
          .min = 1,
          .max = 1e6,
          .value_name = "TIME",
@@ -165,7 +157,7 @@ static const option *options(int *count)
          .of = "paper time anchors",
          .short_name = 'd',
          .kind = OPTION_DOUBLE,
-         .value = &downscale,
+         .value = &request.runs.downscale,
          .min = 1,
          .max = 64,
          .value_name = "F",
@@ -173,7 +165,7 @@ static const option *options(int *count)
         {.name = "eval-split",
          .of = "paper time anchors",
          .kind = OPTION_STRING,
-         .value = &eval_split,
+         .value = &request.runs.eval_split,
          .value_name = "SPLIT",
          .choices = "auto|every=8|validate=8",
          .help = "held-out photos, as of train; validate=8 to choose settings by. Default: "
@@ -181,7 +173,7 @@ static const option *options(int *count)
         {.name = "seeds",
          .of = "paper time anchors",
          .kind = OPTION_INT,
-         .value = &seeds,
+         .value = &request.runs.seeds,
          .min = 0,
          .max = 10,
          .value_name = "N",
@@ -195,9 +187,6 @@ static const option *options(int *count)
 
 static int run(const operands *given)
 {
-    lab_study_def *def = &request.def;
-    lab_paper_def *paper = &request.paper;
-    lab_anchors_def *anchors = &request.anchors;
     size_t which = 0;
     while (strcmp(given->value[0], study_words[which].name) != 0) /* options_parse() takes no others */
         which++;
@@ -206,16 +195,8 @@ static int run(const operands *given)
     if (given->count - 1 > studies[which].models_max)
         return command_misused("study %s: \"%.60s\" is one too many", study_words[which].name,
                                given->value[1 + studies[which].models_max]);
-    def->models = paper->data = request.time.data = anchors->data = given->value + 1;
-    def->model_count = paper->data_count = request.time.data_count = anchors->data_count =
-        (size_t)given->count - 1;
-    paper->downscale = request.time.downscale = anchors->downscale = downscale;
-    if (seeds > 0)
-        paper->seeds = request.time.seeds = anchors->seeds = seeds;
-    if (eval_split != NULL)
-        paper->eval_split = request.time.eval_split = anchors->eval_split = eval_split;
-    if (iterations > 0)
-        paper->iterations = anchors->iterations = iterations;
+    request.def.models = request.runs.data = given->value + 1;
+    request.def.model_count = request.runs.data_count = (size_t)given->count - 1;
     gbt_error err = {0};
     const bool first = gbt_cluster_rank() == 0;
     if (!studies[which].shares_work)

@@ -93,7 +93,7 @@ static void add_duration(char *out, size_t size, double seconds)
 static void add_size(char *out, size_t size, double bytes)
 {
     int unit = 0;
-    if (bytes <= 0 || bytes > 0x1p50) /* 0: no default; beyond: no limit */
+    if (bytes <= 0) /* no default */
         return;
     while (unit < 4 && bytes >= 1024) {
         bytes /= 1024;

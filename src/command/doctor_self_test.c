@@ -137,15 +137,14 @@ static gbt_status compare_gradients(patient *p, const reference_scene *exact, gb
 {
     const size_t rays = ray_image_count(&p->rays);
     size_t left_out = 0;
-    double background[3] = {0}, square = 0, wanted_square = 0;
+    double square = 0, wanted_square = 0;
     for (size_t i = 0; i < 3 * rays; i++) {
         p->d_rgb.pixels[i] = p->in_band[i / 3] ? 0 : (float)rng_normal(STREAM_GRADIENT, i, 0);
         p->d_exact[i] = (double)p->d_rgb.pixels[i];
         left_out += i % 3 == 0 && p->in_band[i / 3];
     }
-    GBT_TRY(trace_backward(&p->scene, &p->rays, &p->d_rgb, &p->d_gaussians, NULL, NULL, err));
-    GBT_TRY(reference_scene_backward(exact, &p->settings, &p->rays, p->d_exact, NULL, p->d_wanted, background,
-                                     err));
+    GBT_TRY(trace_backward(&p->scene, &p->rays, &p->d_rgb, &p->d_gaussians, NULL, err));
+    GBT_TRY(reference_scene_backward(exact, &p->settings, &p->rays, p->d_exact, NULL, p->d_wanted, err));
     const float *const fields[] = {
 #define X(name, pad, meaning) p->d_gaussians.name,
         GAUSSIANS_FIELDS(X)

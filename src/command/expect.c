@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "train/def.h"
 #include "train/photos.h"
 #include "train/step_size.h"
 
@@ -12,7 +13,6 @@
    they meet within a quarter. */
 static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76;
 static const double score_core_seconds_per_megapixel = 5.5;
-static const double default_budget_seconds = 600;
 
 /* How many times as long the same takes. AVX-512 from runs of 42 s on another such machine; NEON and plain C
    from instructions counted, and the tracer's time (docs/performance.md). */
@@ -76,7 +76,7 @@ void expect_print(const expectation *e, FILE *out)
     fprintf(out,
             "  expect    training takes about %.0f MB; in 10 minutes (the default budget) %.0f "
             "iterations on %d thread%s",
-            rounded(e->memory.whole / 1e6), rounded(default_budget_seconds / e->step_seconds), e->threads,
+            rounded(e->memory.whole / 1e6), rounded(TRAIN_BUDGET_SECONDS / e->step_seconds), e->threads,
             e->threads == 1 ? "" : "s");
     if (e->score_seconds > 0)
         fprintf(out, ", then %.0f s for the scores", fmax(1, rounded(e->score_seconds)));

@@ -82,7 +82,7 @@ gbt_status mask_apply(const scene_view *view, const image *stored, unsigned char
 {
     const size_t count = (size_t)stored->width * (size_t)stored->height;
     unsigned char *marks = NULL;
-    if (view->alpha == SCENE_ALPHA_MASK && stored->channels == 4) {
+    if (view->alpha == GBT_ALPHA_MASK && stored->channels == 4) {
         GBT_TRY(mark_pixels(stored, opacity, 0.5f, &marks, err));
         combine(marks, count, valid);
     }

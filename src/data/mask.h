@@ -7,7 +7,7 @@
 #include "data/scene.h"
 
 /**
- * Take pixels out of `valid` by the view's mask picture and, with SCENE_ALPHA_MASK, by the photo's alpha
+ * Take pixels out of `valid` by the view's mask picture and, with GBT_ALPHA_MASK, by the photo's alpha
  * channel.
  *
  * The value of a mask's pixel is the largest of its colours, times its opacity. It counts when it has at

@@ -14,10 +14,10 @@
 /* Four channels to three; `premultiplied`: the colours are times alpha already. image_read() gives finite
    values, and alpha in [0, 1] keeps them so; where it is a mask, they are divided by no less than a half,
    for what is below does not count. */
-static gbt_status to_rgb(const image *in, scene_alpha kind, bool premultiplied, image *out, gbt_error *err)
+static gbt_status to_rgb(const image *in, gbt_alpha kind, bool premultiplied, image *out, gbt_error *err)
 {
-    const float behind = kind == SCENE_ALPHA_WHITE;
-    const bool is_mask = kind == SCENE_ALPHA_MASK;
+    const float behind = kind == GBT_ALPHA_WHITE;
+    const bool is_mask = kind == GBT_ALPHA_MASK;
     GBT_TRY(image_alloc(out, in->width, in->height, 3, err));
     const size_t count = (size_t)in->width * (size_t)in->height, channels = (size_t)in->channels;
     for (size_t i = 0; i < count; i++) {
@@ -58,10 +58,10 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
 }
 
 /* How transparent a stored photo is, at another size; `out` stays empty where nothing is. */
-static gbt_status read_through(const image *stored, scene_alpha kind, int width, int height, image *out,
+static gbt_status read_through(const image *stored, gbt_alpha kind, int width, int height, image *out,
                                gbt_error *err)
 {
-    if (stored->channels < 4 || kind == SCENE_ALPHA_MASK)
+    if (stored->channels < 4 || kind == GBT_ALPHA_MASK)
         return GBT_OK;
     image at_stored;
     GBT_TRY(image_alloc(&at_stored, stored->width, stored->height, 1, err));

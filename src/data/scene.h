@@ -16,19 +16,12 @@
 #include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
-/** What the transparent part of a photo is. */
-typedef enum scene_alpha {
-    SCENE_ALPHA_BLACK, /* the photo lies on black */
-    SCENE_ALPHA_WHITE, /* the photo lies on white */
-    SCENE_ALPHA_MASK   /* pixels of less than half opacity mean nothing, the others are opaque */
-} scene_alpha;
-
 typedef struct scene_view {
     char *name;        /* image name as the data set gives it, may hold sub-folders; owned */
     char *path;        /* where the pixels are; owned. NULL: there are none (data/cameras_json.h) */
     char *mask_path;   /* a picture whose dark pixels say which ones of the photo mean nothing; NULL: none;
                           owned */
-    scene_alpha alpha; /* see scene_set_alpha() */
+    gbt_alpha alpha;   /* see scene_set_alpha() */
     int photo_width;   /* as the photo's header says; 0: not read (photo_check_all()), or unreadable */
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
@@ -117,8 +110,9 @@ static inline void scene_view_free(scene_view *view)
 }
 
 /**
- * Say what the transparent part of photos is; GBT_ALPHA_AUTO is white for Blender's synthetic scenes, as
- * everybody scores them, else black, which is also what scene_load() leaves.
+ * Say what the transparent part of photos is: black or white, on which the photo lies, or a mask (pixels of
+ * less than half opacity mean nothing, the others are opaque). GBT_ALPHA_AUTO is white for Blender's
+ * synthetic scenes, as everybody scores them, else black. What scene_load() leaves counts as black.
  */
 void scene_set_alpha(scene *s, gbt_alpha alpha);
 
@@ -141,7 +135,7 @@ gbt_status scene_read_photo(const scene_view *view, int width, int height, image
  * scene_read_photo(), and which pixels mean something.
  *
  * @param valid [out] NULL when all do, else [height][width]: 0 where a value that is not finite, or a pixel
- *                    that the mask or the alpha channel (SCENE_ALPHA_MASK) leaves out, had a part in it; free
+ *                    that the mask or the alpha channel (GBT_ALPHA_MASK) leaves out, had a part in it; free
  *                    with mem_free()
  */
 gbt_status scene_read_photo_valid(const scene_view *view, int width, int height, image *out,

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 #include "data/scene.h"
 
@@ -84,21 +85,19 @@ void scene_set_alpha(scene *s, gbt_alpha alpha)
     if (alpha == GBT_ALPHA_AUTO)
         alpha = strcmp(s->source, "blender") == 0 ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (size_t i = 0; i < s->view_count; i++)
-        s->views[i].alpha = alpha == GBT_ALPHA_WHITE  ? SCENE_ALPHA_WHITE
-                            : alpha == GBT_ALPHA_MASK ? SCENE_ALPHA_MASK
-                                                      : SCENE_ALPHA_BLACK;
+        s->views[i].alpha = alpha;
 }
 
 bool scene_background(const scene *s, float color[3])
 {
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
-        int width, height, channels;
-        if (view->is_test || view->alpha == SCENE_ALPHA_MASK ||
-            image_probe(view->path, &width, &height, &channels, NULL) != GBT_OK || channels != 4)
+        image_header header;
+        if (view->is_test || view->alpha == GBT_ALPHA_MASK ||
+            image_header_read(view->path, &header, NULL) != GBT_OK || !header.has_alpha)
             continue;
         for (int c = 0; c < 3; c++)
-            color[c] = view->alpha == SCENE_ALPHA_WHITE;
+            color[c] = view->alpha == GBT_ALPHA_WHITE;
         return true;
     }
     return false;

@@ -8,7 +8,7 @@
 
 #include "base/camera_model.h"
 #include "base/fail.h"
-#include "base/image.h"
+#include "base/image_header.h"
 #include "base/vec.h"
 
 /* A number when the key is there; `*found` says whether it is. */
@@ -157,10 +157,10 @@ gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_c
     GBT_TRY(find_size(s, "w", &camera->width, &has_width, err));
     GBT_TRY(find_size(s, "h", &camera->height, &has_height, err));
     if (!has_width || !has_height) {
-        int width, height, channels;
-        GBT_TRY(image_probe(photo, &width, &height, &channels, err));
-        camera->width = has_width ? camera->width : width;
-        camera->height = has_height ? camera->height : height;
+        image_header header;
+        GBT_TRY(image_header_read(photo, &header, err));
+        camera->width = has_width ? camera->width : header.width;
+        camera->height = has_height ? camera->height : header.height;
     }
     GBT_TRY(find_kind(s, &kind, &is_opencv, err));
     double *p = camera->params;

@@ -34,14 +34,6 @@ void frame_times_add(frame_times *sum, const frame_times *more)
 
 /* ---- render and back ---- */
 
-static gbt_status fit_picture(image *rgb, int width, int height, gbt_error *err)
-{
-    if (rgb->width == width && rgb->height == height)
-        return GBT_OK;
-    image_free(rgb);
-    return image_alloc(rgb, width, height, 3, err);
-}
-
 /* A variance in pixels of the picture, in pixels of the camera. */
 static float pixel_variance(const frame *f, float variance)
 {
@@ -128,7 +120,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->times.decode = stage_lap(&clock);
     f->times.build = (stage_time){0};
     memset(&f->counters, 0, sizeof f->counters);
-    GBT_TRY(fit_picture(&f->rgb, f->rays.width, f->rays.height, err));
+    GBT_TRY(image_fit(&f->rgb, f->rays.width, f->rays.height, 3, err));
     if (f->draw.renderer != GBT_RENDERER_TRACE)
         return GBT_OK;
     const float aperture = shot->given == NULL ? (float)shot->aperture_radius : 0;
@@ -239,12 +231,6 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
     return status;
 }
 
-gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot,
-                             const trace_settings *settings, gbt_error *err)
-{
-    return frame_render_with(f, subject, shot, settings, NULL, err);
-}
-
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT])
 {
     footprint_gaussian g; /* the first fields, in their order */
@@ -262,9 +248,9 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
     GBT_TRY(mem_reserve((void **)&f->blend_weight, &f->blend_weight_capacity, 0, f->gaussians.count + 1,
                         sizeof *f->blend_weight, "weights", err));
     if (f->draw.renderer == GBT_RENDERER_TRACE)
-        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
+        GBT_TRY(trace_backward(&f->scene, &f->rays, d_image, &f->d_gaussians, f->blend_weight, err));
     else
-        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->blend_weight, NULL, err));
+        GBT_TRY(raster_backward(&f->splats, d_image, &f->d_gaussians, f->blend_weight, err));
     if (f->widened)
         footprint_backward(&f->view, pixel_variance(f, f->draw.footprint), pixel_min_of(f), &f->gaussians,
                            &f->d_gaussians);

@@ -98,21 +98,6 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
 gbt_status frame_prepare(frame *f, frame_subject subject, const gbt_camera *camera,
                          const trace_settings *settings, gbt_error *err);
 
-/**
- * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
- *
- * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the
- * middle of the aperture. That is the camera centre, the middle of the way of a rolling shutter, the middle
- * of an orthographic picture (a point far behind it, where parallel rays would meet, is farther than any the
- * networks were trained for: measured, it spoils the picture). f->rays are left those of the last sample.
- * There is no adjoint.
- *
- * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
- * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
- */
-gbt_status frame_render_shot(frame *f, frame_subject subject, const ray_shot *shot,
-                             const trace_settings *settings, gbt_error *err);
-
 /** What traces the rays of a shot in place of trace_forward(), and sends rays of its own where the picture
     does not look. */
 typedef struct frame_tracer {
@@ -122,8 +107,19 @@ typedef struct frame_tracer {
     float reach; /* largest |coordinate| of an origin of its own rays */
 } frame_tracer;
 
-/** frame_render_shot() with a tracer: everything is made, seen from the camera or not, all from the one
-    point. */
+/**
+ * Render a shot (trace/rays.h) into f->rgb: the mean over its samples, added up in their order in double.
+ *
+ * Anchors are decoded (harmonics summed) once, for one point: the mean of the origins of the rays through the
+ * middle of the aperture. That is the camera centre, the middle of the way of a rolling shutter, the middle
+ * of an orthographic picture (a point far behind it, where parallel rays would meet, is farther than any the
+ * networks were trained for: measured, it spoils the picture). f->rays are left those of the last sample.
+ * There is no adjoint.
+ *
+ * @param tracer [in] optional (NULL); with one everything is made, seen from the camera or not
+ * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
+ * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
+ */
 gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *shot,
                              const trace_settings *settings, const frame_tracer *tracer, gbt_error *err);
 

@@ -9,6 +9,9 @@
 
 enum { GROWTH_MAX_LEVELS = 8 };
 
+/** Part of the views between rounds (growth_def.interval). */
+#define GROWTH_SUCCESS 0.8f
+
 /** Points where surface is known to be, besides where Gaussians are. All borrowed. */
 typedef struct growth_points {
     size_t count;
@@ -21,21 +24,20 @@ typedef struct growth_points {
 } growth_points;
 
 typedef struct growth_def {
-    float voxel_size;     /* v: cells are v * init_factor / hierarchy^level */
-    int level_count;      /* [0, GROWTH_MAX_LEVELS], default 3 */
-    int init_factor;      /* default 16 */
-    int hierarchy_factor; /* default 4 */
-    float grad_threshold; /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
-    float importance_min; /* anchors with less in the mean over the views that show them are pruned. Default
-                             0.005, an opacity */
-    float interval;       /* I: views between rounds, default 100 */
-    float success_threshold; /* default 0.8: a Gaussian counts when grad_count > interval * success * 0.5; an
-                                anchor is judged when visit_count > interval * success. What was judged starts
-                                again from 0 */
-    float shape_log_max;     /* scale_log[3..5] are cut to this in every round. Default infinity */
-    size_t max_anchors;      /* hard cap on the rows after the round; pruning makes room first, the cap prunes
-                                nothing. When it bites, the cells with the largest gradient of all levels win,
-                                ties by level, then cell. Default SIZE_MAX */
+    float voxel_size;      /* v: cells are v * init_factor / hierarchy^level */
+    int level_count;       /* [0, GROWTH_MAX_LEVELS], default 3 */
+    int init_factor;       /* default 16 */
+    int hierarchy_factor;  /* default 4 */
+    float grad_threshold;  /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
+    float importance_min;  /* anchors with less in the mean over the views that show them are pruned. Default
+                              0.005, an opacity */
+    float interval;        /* I: views between rounds, default 100: a Gaussian counts when grad_count > I *
+                              GROWTH_SUCCESS * 0.5; an anchor is judged when visit_count > I * GROWTH_SUCCESS.
+                              What was judged starts again from 0 */
+    float shape_log_max;   /* scale_log[3..5] are cut to this in every round. Default infinity */
+    size_t max_anchors;    /* hard cap on the rows after the round; pruning makes room first, the cap prunes
+                              nothing. When it bites, the cells with the largest gradient of all levels win,
+                              ties by level, then cell. Default SIZE_MAX */
     bool integer_division; /* init_factor / hierarchy^level and hierarchy/2 are divided as integers: 4 / 16 is
                               0. Default false, as the next two */
     bool coarse_level_gates; /* while no level has added an anchor, finer ones are not searched */

@@ -8,7 +8,7 @@
 /** Was the anchor visible in enough views for its importance to say something? */
 static inline bool growth_is_judged(const growth_def *def, float visit_count)
 {
-    return visit_count > def->interval * def->success_threshold;
+    return visit_count > def->interval * GROWTH_SUCCESS;
 }
 
 /**

@@ -29,7 +29,6 @@ growth_def growth_def_default(void)
                         .grad_threshold = 2e-4f,
                         .importance_min = 0.005f,
                         .interval = 100.0f,
-                        .success_threshold = 0.8f,
                         .shape_log_max = INFINITY,
                         .max_anchors = SIZE_MAX,
                         .seed = 0,
@@ -58,11 +57,9 @@ static gbt_status check_arguments(const anchors *a, const growth_stats *stats, c
         if (def->points.anchor[p] >= a->count)
             return base_fail(err, GBT_ERR_ARGUMENT, "growth: point %zu is anchor %u's (wanted below %zu)", p,
                              (unsigned)def->points.anchor[p], a->count);
-    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || !(def->success_threshold >= 0.0f) ||
-        isnan(def->shape_log_max))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "growth: threshold %g, interval %g, success %g (wanted all >= 0)",
-                         (double)def->grad_threshold, (double)def->interval, (double)def->success_threshold);
+    if (!(def->grad_threshold >= 0.0f) || !(def->interval >= 0.0f) || isnan(def->shape_log_max))
+        return base_fail(err, GBT_ERR_ARGUMENT, "growth: threshold %g, interval %g (wanted both >= 0)",
+                         (double)def->grad_threshold, (double)def->interval);
     return GBT_OK;
 }
 

@@ -57,7 +57,7 @@ float growth_level_threshold(const growth_def *def, int level);
 /** Was the Gaussian seen in enough views for its mean gradient to say something? */
 static inline bool growth_well_sampled(const growth_def *def, float grad_count)
 {
-    return grad_count > def->interval * def->success_threshold * 0.5f;
+    return grad_count > def->interval * GROWTH_SUCCESS * 0.5f;
 }
 
 /** Start on an empty grid of the level; false when there is none, or the level is not to be searched. */

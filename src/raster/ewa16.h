@@ -74,8 +74,7 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
                    stop_at = vfloat16_set1(settings->transmittance_min);
     const vfloat16 zero = vfloat16_set1(0);
     uint64_t blended = 0;
-    int i = 0;
-    for (; i < chunk->count[block]; i++) {
+    for (int i = 0; i < chunk->count[block]; i++) {
         const int e = chunk->list[block][i];
         const splat *s = chunk->splats[e];
         const ewa_response r = ewa_respond(s, chunk->at[e][0], chunk->at[e][1], block);
@@ -103,8 +102,7 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
             break;
     }
     *state = b;
-    job->counts.blended += blended;
-    job->counts.tests += (uint64_t)i * PIXEL_LANES;
+    job->blended += blended;
 }
 
 /* Which blocks do the splats of a chunk reach, of those that are not done. */
@@ -219,8 +217,6 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
 {
     (void)scratch;
     ewa_return state[TILE_BLOCKS];
-    vfloat16 background[3] = {vfloat16_set1(0), vfloat16_set1(0), vfloat16_set1(0)};
-    float sums[3];
     for (int block = 0; block < TILE_BLOCKS; block++) {
         ewa_return *b = &state[block];
         b->transmittance = vfloat16_load(job->tape->transmittance[block]);
@@ -230,12 +226,8 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
             b->d_rgb[c] = vfloat16_load(job->pixels->rgb[block][c]);
             b->behind =
                 vfloat16_fma(b->d_rgb[c], vfloat16_load(job->pixels->background[block][c]), b->behind);
-            background[c] = vfloat16_fma(b->transmittance, b->d_rgb[c], background[c]);
         }
     }
-    store_sums(background, 3, sums);
-    for (int c = 0; c < 3; c++)
-        job->d_background[c] += sums[c];
     for (size_t e = job->count; e-- > 0;) {
         const splat *s = &job->splats[job->entries[e].splat];
         float *record = job->records + (size_t)job->entries[e].pair * EWA_SUMS, at[2];

@@ -87,10 +87,6 @@ enum { EWA_COLOR = 6, EWA_WEIGHT = 9, EWA_SUMS, RAY_COLOR = 10, RAY_WEIGHT = 13,
 
 static inline size_t raster_sum_count(raster_form form) { return form == RASTER_EWA ? EWA_SUMS : RAY_SUMS; }
 
-typedef struct tile_counts {
-    uint64_t tests, blended;
-} tile_counts;
-
 /* Growing memory of the per-ray form, one per tile in flight. Start from {0}, free all. */
 typedef struct ray_scratch {
     struct ray_row *rows;
@@ -109,11 +105,10 @@ typedef struct tile_job {
     size_t count;
     int x0, y0; /* first pixel */
     tile_pixels *pixels;
-    tile_tape *tape;     /* forward: NULL when no adjoint will follow */
-    uint16_t *blocks;    /* EWA, [count]: bit per block in which the entry was blended; NULL with the tape */
-    float *records;      /* backward, [pairs][sums]: those of this tile's entries are written */
-    float *d_background; /* backward, [3], added to */
-    tile_counts counts;
+    tile_tape *tape;  /* forward: NULL when no adjoint will follow */
+    uint16_t *blocks; /* EWA, [count]: bit per block in which the entry was blended; NULL with the tape */
+    float *records;   /* backward, [pairs][sums]: those of this tile's entries are written */
+    uint64_t blended; /* pairs of Gaussian and pixel, added to */
 } tile_job;
 
 typedef struct raster_kernel {

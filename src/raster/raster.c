@@ -27,10 +27,9 @@ struct raster_state {
     tile_tape *tapes;
     uint16_t *blocks; /* see tile_job */
     float *records;
-    tile_counts *counts;
-    float (*d_background)[3];
+    uint64_t *blended; /* per tile */
     size_t splat_capacity, ray_capacity, drawn_capacity, tape_capacity, blocks_capacity, record_capacity,
-        count_capacity, background_capacity;
+        blended_capacity;
     bool tape_kept;
 };
 
@@ -226,7 +225,6 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     ray_scratch scratch = {0};
     if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p))
         return;
-    memset(state->d_background[index], 0, sizeof *state->d_background);
     tile_job job = {.view = &state->view,
                     .splats = state->splats,
                     .rays = state->rays,
@@ -237,12 +235,11 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
                     .pixels = &pixels,
                     .tape = tape ? &state->tapes[index] : NULL,
                     .blocks = tape ? state->blocks + first : NULL,
-                    .records = state->records,
-                    .d_background = state->d_background[index]};
+                    .records = state->records};
     look_behind(&job);
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
-    state->counts[index] = job.counts;
+    state->blended[index] = job.blended;
     mem_free(scratch.rows);
     mem_free(scratch.hits);
     mem_free(scratch.reached);
@@ -252,10 +249,8 @@ static gbt_status run_pass(pass *p, gbt_error *err)
 {
     struct raster_state *state = p->state;
     const size_t count = tile_count_of(&state->view);
-    GBT_TRY(mem_reserve((void **)&state->counts, &state->count_capacity, 0, count, sizeof *state->counts,
+    GBT_TRY(mem_reserve((void **)&state->blended, &state->blended_capacity, 0, count, sizeof *state->blended,
                         "raster tiles", err));
-    GBT_TRY(mem_reserve((void **)&state->d_background, &state->background_capacity, 0, count,
-                        sizeof *state->d_background, "raster tiles", err));
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
     if (is_stopped(p))
@@ -271,10 +266,8 @@ static void add_counters(const struct raster_state *state, raster_counters *coun
     counters->pixels += (uint64_t)state->view.width * (uint64_t)state->view.height;
     counters->drawn += state->lists.splat_count;
     counters->pairs += state->lists.pair_count;
-    for (size_t i = 0; i < tile_count_of(&state->view); i++) {
-        counters->tests += state->counts[i].tests;
-        counters->blended += state->counts[i].blended;
-    }
+    for (size_t i = 0; i < tile_count_of(&state->view); i++)
+        counters->blended += state->blended[i];
 }
 
 gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_camera *camera,
@@ -312,7 +305,7 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
 }
 
 gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,
-                           float d_background[3], gbt_error *err)
+                           gbt_error *err)
 {
     struct raster_state *state = scene->state;
     if (state == NULL || !state->tape_kept)
@@ -326,11 +319,6 @@ gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d
                         "raster gradients", err));
     pass p = {.state = state, .d_rgb = d_rgb, .stop = scene->stop};
     GBT_TRY(run_pass(&p, err));
-    for (int c = 0; c < 3 && d_background != NULL; c++) {
-        d_background[c] = 0;
-        for (size_t i = 0; i < tile_count_of(view); i++)
-            d_background[c] += state->d_background[i][c];
-    }
     return raster_gradients(view, state->source, state->splats, state->drawn, &state->lists, state->records,
                             d_gaussians, weight, err);
 }
@@ -342,7 +330,7 @@ void raster_scene_free(raster_scene *scene)
         return;
     tile_lists_free(&state->lists);
     void *const owned[] = {state->splats, state->rays,    state->drawn,  state->tapes,
-                           state->blocks, state->records, state->counts, state->d_background};
+                           state->blocks, state->records, state->blended};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     mem_free(state);

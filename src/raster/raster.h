@@ -41,8 +41,8 @@ typedef struct raster_settings {
 raster_settings raster_settings_default(void);
 
 typedef struct raster_counters {
-    uint64_t pixels, drawn, pairs, tests,
-        blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and pixel; those blended */
+    uint64_t pixels, drawn, pairs, blended; /* Gaussians drawn; pairs of Gaussian and tile; of Gaussian and
+                                               pixel, blended */
 } raster_counters;
 
 /** The last view and the memory of passes, reused from view to view. Start from {0}. */
@@ -81,16 +81,15 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
  * its limit in the Jacobian. Per ray the depth of the response is a constant of the derivative (envelope
  * theorem, trace/reference.h).
  *
- * @param d_rgb        [in]  dL/d(rgb)
- * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
- *                           tangent)
- * @param weight       [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was
- *                           seen
- * @param d_background [out] optional (NULL), [3], overwritten
+ * @param d_rgb       [in]  dL/d(rgb)
+ * @param d_gaussians [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
+ *                          tangent)
+ * @param weight      [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was
+ *                          seen
  * Threads: uses all; same bits for every thread count.
  */
 gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,
-                           float d_background[3], gbt_error *err);
+                           gbt_error *err);
 
 void raster_scene_free(raster_scene *scene);
 

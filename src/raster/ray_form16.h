@@ -153,7 +153,6 @@ static inline bool gather_rows(tile_job *job, int block, const block_rays *rays,
         const ray_response r =
             ray_respond(&job->rays[job->entries[e].splat], s->opacity, rays, settings->near);
         const vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(settings->alpha_min), r.raw), inside);
-        job->counts.tests += PIXEL_LANES;
         if (!vmask16_any(hit))
             continue;
         if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, *count, *count + 1, sizeof(ray_row),
@@ -248,7 +247,7 @@ static bool forward_rays(tile_job *job, ray_scratch *scratch)
         for (int lane = 0; lane < PIXEL_LANES; lane++) {
             float rgb[3], *T = &job->pixels->transmittance[block][lane];
             const size_t count = hits_of_ray(job, scratch, row_count, lane);
-            job->counts.blended += blend_ray(job, scratch, count, lane, rgb, T);
+            job->blended += blend_ray(job, scratch, count, lane, rgb, T);
             for (int c = 0; c < 3; c++)
                 job->pixels->rgb[block][c][lane] = fmaf(*T, job->pixels->background[block][c][lane], rgb[c]);
         }
@@ -263,10 +262,8 @@ static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_co
     float rgb[3], T, behind = 0;
     const size_t count = hits_of_ray(job, scratch, row_count, lane),
                  blended = blend_ray(job, scratch, count, lane, rgb, &T);
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
         behind = fmaf(d_rgb[c], job->pixels->background[block][c][lane], behind);
-        job->d_background[c] += T * d_rgb[c];
-    }
     for (size_t i = 0; i < row_count; i++)
         scratch->rows[i].t[lane] = 0;
     for (size_t i = count; i-- > 0;) {

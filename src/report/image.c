@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/image.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 #include "base/vec.h"
 
@@ -155,8 +156,8 @@ void report_image_jpeg(text *out, const image *picture)
 
 void report_picture_size(const char *path, int *width, int *height)
 {
-    int channels;
-    gbt_error ignored = {0};
-    if (image_probe(path, width, height, &channels, &ignored) != GBT_OK)
-        *width = *height = 0;
+    image_header header;
+    const bool is_read = image_header_read(path, &header, NULL) == GBT_OK;
+    *width = is_read ? header.width : 0;
+    *height = is_read ? header.height : 0;
 }

@@ -233,7 +233,7 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
 /*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
 static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
                            const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                           gradient_list *out, float d_background[3], kernel_scratch *scratch)
+                           gradient_list *out, kernel_scratch *scratch)
 {
     adjoint_rows o;
     if (!reserve_rows(count, scratch, &o))
@@ -296,12 +296,6 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     for (int first = 0; first < count; first += 16)
         if (!add_rows(entry, &o, first, out))
             return false;
-    _Alignas(64) float t[PACKET_LANES];
-    vfloat16_store(t, transmittance);
-    for (int c = 0; c < 3; c++)
-        for (int lane = 0; lane < PACKET_LANES; lane++)
-            if (rays->active >> lane & 1)
-                d_background[c] += t[lane] * d_rgb_in[c][lane];
     return true;
 }
 
@@ -309,7 +303,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
    one operation; the rest is done for sixteen. */
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                        gradient_list *out, float d_background[3], kernel_scratch *scratch)
+                        gradient_list *out, kernel_scratch *scratch)
 {
     enum { RAW, V, COLOR = V + 3, OPACITY, CLEAR, TERM, T, BEHIND, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
@@ -349,10 +343,8 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         T_before[i] = transmittance;
         transmittance *= clear[i];
     }
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 3; c++)
         behind = fmaf(rays->background[c][lane], d_rgb_in[c][lane], behind);
-        d_background[c] += transmittance * d_rgb_in[c][lane];
-    }
     for (int i = count; i-- > 0;) {
         behind_hit[i] = behind;
         behind = fmaf(clear[i], behind, term[i]);
@@ -391,7 +383,7 @@ static __attribute__((noinline)) size_t count_entries(const tape_entry *entry, s
 
 static bool backward(const kernel_scene *scene, const tile_rays *tile,
                      float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry, gradient_list *out,
-                     float d_background[3], kernel_scratch *scratch)
+                     kernel_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
     size_t of_packet[TILE_PACKETS] = {0};
@@ -411,9 +403,8 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile,
     const tape_entry *next = entry, *end = entry + count;
     for (int p = 0; p < TILE_PACKETS; p++) {
         if ((singles >> p & 1) == 0) {
-            if (rays[p].active != 0 &&
-                !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p], at[p] - of_packet[p],
-                                (int)of_packet[p], out, d_background, scratch))
+            if (rays[p].active != 0 && !packet_adjoint(scene, &rays[p], seen ? &beam : NULL, d_rgb[p],
+                                                       at[p] - of_packet[p], (int)of_packet[p], out, scratch))
                 return false;
             continue;
         }
@@ -426,8 +417,7 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile,
             const tape_entry *first = next;
             while (next < end && next->packet == (p | TAPE_SINGLE) && next->lanes == lane)
                 next++;
-            if (!ray_adjoint(scene, &rays[p], lane, d_rgb[p], first, (int)(next - first), out, d_background,
-                             scratch))
+            if (!ray_adjoint(scene, &rays[p], lane, d_rgb[p], first, (int)(next - first), out, scratch))
                 return false;
         }
     }

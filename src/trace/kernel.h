@@ -158,12 +158,11 @@ typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays,
  * Adjoint of a tile: replay the hits that forward left on the tape, add to the record of every Gaussian that
  * was blended.
  *
- * @param d_rgb        [in]  dL/d(rgb)
- * @param d_background [out] [3], added to
+ * @param d_rgb [in] dL/d(rgb)
  */
 typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays,
                               float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *tape,
-                              gradient_list *out, float d_background[3], kernel_scratch *scratch);
+                              gradient_list *out, kernel_scratch *scratch);
 
 typedef struct tile_kernel {
     tile_forward_fn *forward, *forward_single,

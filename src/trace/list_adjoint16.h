@@ -300,8 +300,7 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
 
 static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
                               const list_rays *seen, const tape_entry *entry, size_t count,
-                              float d_rgb_in[3][PACKET_LANES], vfloat16 d_background[3], list_rows *rows,
-                              list_scratch *scratch)
+                              float d_rgb_in[3][PACKET_LANES], list_rows *rows, list_scratch *scratch)
 {
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
@@ -311,8 +310,7 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
     replay_list(scene, used, rays, seen, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
-    const vfloat16 last = rows->product;
-    const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), last);
+    const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), rows->product);
     if (scene->settings.packet_order)
         collect_behind_in_order(rows, used, d_rgb, background);
     else if (!rows->crowded)
@@ -320,15 +318,12 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
     else if (!collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
     sum_rows(scene, used, rays, seen, d_rgb, rows, scratch->sums);
-    const vmask16 active = vmask16_from_bits(rays->active);
-    for (int c = 0; c < 3; c++)
-        d_background[c] = vfloat16_add_where(active, d_background[c], vfloat16_mul(last, d_rgb[c]));
     return true;
 }
 
 static bool backward_list(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
                           float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape,
-                          float d_background[3], list_scratch *scratch)
+                          list_scratch *scratch)
 {
     const size_t begin = view->first[part], pairs = view->first[part + 1] - begin;
     double middle[2];
@@ -339,9 +334,6 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;
-    vfloat16 total[16];
-    for (int k = 0; k < 16; k++)
-        total[k] = vfloat16_set1(0);
     for (int p = 0; p < TILE_PACKETS; p++) {
         const size_t from = at;
         list_rays seen;
@@ -351,13 +343,9 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
             at++;
         slope_rays(part_frame(view, part), &rays->packet[p], middle, &seen);
         if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape->entries + from, at - from,
-                               d_rgb[p], total, &rows, scratch))
+                               d_rgb[p], &rows, scratch))
             return false;
     }
-    _Alignas(64) float sum[16];
-    vfloat16_store(sum, vfloat16_sum_rows(total));
-    for (int c = 0; c < 3; c++)
-        d_background[c] += sum[c];
     for (size_t i = 0; i < pairs; i++) {
         if (i + AHEAD < pairs)
             __builtin_prefetch(&view->slots[view->pairs[begin + i + AHEAD].slot], 1);

@@ -221,8 +221,7 @@ typedef struct list_kernel {
                     kernel_counters *counters);
     /** Its adjoint, into the slots of the part's pairs. */
     bool (*backward)(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
-                     float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape, float d_background[3],
-                     list_scratch *scratch);
+                     float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape, list_scratch *scratch);
     /** Sums of the records [begin, end) of a face over their slots, turned into the Gaussians' own axes. */
     void (*turn_sums)(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
                       size_t end, gradient_record *out);

@@ -292,14 +292,11 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
    is divided by 1 - alpha. */
 static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
                          const double origin[3], const double dir[3], const hit_list *list,
-                         const double d_rgb[3], double d_transmittance, double *d_gaussians,
-                         double d_background[3])
+                         const double d_rgb[3], double d_transmittance, double *d_gaussians)
 {
     double rgb[3], T, behind[3], open = 1;
     const size_t blended = blend(scene, s, list, dir, 1, rgb, &T);
     sky_color_exact(&s->sky, s->background, dir, behind);
-    for (int c = 0; c < 3; c++)
-        d_background[c] += T * d_rgb[c];
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];
         double in_front = 1;
@@ -319,7 +316,7 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
 
 gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s,
                                     const ray_image *rays, const double *d_rgb, const double *d_transmittance,
-                                    double *d_gaussians, double d_background[3], gbt_error *err)
+                                    double *d_gaussians, gbt_error *err)
 {
     prepared *all = NULL;
     hit_list list = {0};
@@ -330,7 +327,7 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
         status = gather(all, scene->count, s, &ray, &list, err);
         if (status == GBT_OK)
             ray_backward(scene, all, s, ray.origin, ray.dir, &list, d_rgb + 3 * i,
-                         d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians, d_background);
+                         d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians);
     }
     mem_free(list.hits);
     mem_free(all);

@@ -73,8 +73,7 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
                                    uint32_t *blended, gbt_error *err);
 
 /**
- * Adjoint of reference_scene_forward(): adds dL/dfield into `d_gaussians` and dL/dbackground into
- * `d_background`.
+ * Adjoint of reference_scene_forward(): adds dL/dfield into `d_gaussians`.
  *
  * t_c is held fixed: exact at an inner t* (there d2 is at its minimum along the ray) and at t_near (a
  * constant). The gradient is 0 where alpha is cut at alpha_max. Scales are linear. The quaternion is taken as
@@ -83,12 +82,11 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
  * @param d_rgb           [in]     [rays][3] dL/drgb
  * @param d_transmittance [in]     [rays] dL/dT; NULL = 0
  * @param d_gaussians     [in,out] [GAUSSIANS_FIELD_COUNT][count], in the order of GAUSSIANS_FIELDS
- * @param d_background    [in,out] [3]
  * @return as reference_forward(); after a failure the gradients are incomplete
  * Threads: one; sums are in ray order.
  */
 gbt_status reference_scene_backward(const reference_scene *scene, const trace_settings *s,
                                     const ray_image *rays, const double *d_rgb, const double *d_transmittance,
-                                    double *d_gaussians, double d_background[3], gbt_error *err);
+                                    double *d_gaussians, gbt_error *err);
 
 #endif

@@ -198,7 +198,7 @@ static void load_packet_gradients(const image *d_image, size_t first, float d_rg
 }
 
 void tile_load_gradients(const ray_image *rays, const image *d_image, int x0, int y0, const tile_rays *tile,
-                         float d_rgb[TILE_PACKETS][3][PACKET_LANES], float d_background[3])
+                         float d_rgb[TILE_PACKETS][3][PACKET_LANES])
 {
     for (int packet = 0; packet < TILE_PACKETS; packet++) {
         const unsigned active = tile->packet[packet].active;
@@ -209,13 +209,10 @@ void tile_load_gradients(const ray_image *rays, const image *d_image, int x0, in
         }
         memset(d_rgb[packet], 0, sizeof d_rgb[packet]);
         for (int lane = 0; lane < PACKET_LANES; lane++) {
-            if (!lane_pixel(rays, x0, y0, packet, lane, &at) || tile->elsewhere[packet] >> lane & 1)
+            if (!(active >> lane & 1) || !lane_pixel(rays, x0, y0, packet, lane, &at))
                 continue;
             for (int c = 0; c < 3; c++)
-                if (active >> lane & 1)
-                    d_rgb[packet][c][lane] = d_image->pixels[3 * at + (size_t)c];
-                else
-                    d_background[c] += d_image->pixels[3 * at + (size_t)c]; /* the pixel is the background */
+                d_rgb[packet][c][lane] = d_image->pixels[3 * at + (size_t)c];
         }
     }
 }

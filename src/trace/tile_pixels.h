@@ -18,9 +18,8 @@ void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int 
 void tile_store_pixels(const ray_image *rays, const kernel_scene *scene, const trace_outputs *to, int x0,
                        int y0, const tile_rays *tile, const packet_output out[TILE_PACKETS]);
 
-/** dL/d(rgb) of the tile's rays, 0 for lanes without one. That of pixels without a ray is added to
-    `d_background`. */
+/** dL/d(rgb) of the tile's rays, 0 for lanes without one. */
 void tile_load_gradients(const ray_image *rays, const image *d_image, int x0, int y0, const tile_rays *tile,
-                         float d_rgb[TILE_PACKETS][3][PACKET_LANES], float d_background[3]);
+                         float d_rgb[TILE_PACKETS][3][PACKET_LANES]);
 
 #endif

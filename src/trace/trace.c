@@ -22,7 +22,6 @@ typedef struct trace_tile { /* or the part of one that a face of a view sees */
     bool tape_dropped; /* it did not fit in the memory allowed: backward traces the tile again */
     gradient_list gradients;
     kernel_counters counters;
-    float d_background[3];
 } trace_tile;
 
 static const tile_kernel *kernel_for(cpu_isa isa) { return CPU_VARIANT(tile_kernel, isa); }
@@ -200,16 +199,16 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
                           tile_scratch *scratch)
 {
     _Alignas(64) float d_rgb[TILE_PACKETS][3][PACKET_LANES];
-    tile_load_gradients(p->rays, p->d_rgb, x0, y0, rays, d_rgb, tile->d_background);
+    tile_load_gradients(p->rays, p->d_rgb, x0, y0, rays, d_rgb);
     packet_output again[TILE_PACKETS];
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
     if (p->list == NULL)
         fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
-                                           tile->d_background, &scratch->tree);
+                                           &scratch->tree);
     else
         fine = fine && p->list->backward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
-                                         rays, d_rgb, &tile->tape, tile->d_background, &scratch->list);
+                                         rays, d_rgb, &tile->tape, &scratch->list);
     empty_tape(p, &tile->tape);
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
 }
@@ -234,7 +233,6 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     if (atomic_load_explicit(&p->failed, memory_order_relaxed) || is_stopped(p->scene))
         return;
     gradient_list_free(&tile->gradients);
-    memset(tile->d_background, 0, sizeof tile->d_background);
     if (p->d_rgb == NULL) {
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
@@ -358,7 +356,7 @@ static gbt_status reduce(const pass *p, gaussians *d_gaussians, float *weight, g
 }
 
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
-                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err)
+                          gaussians *d_gaussians, float *weight, gbt_error *err)
 {
     if (scene->tape_width != rays->width || scene->tape_height != rays->height ||
         d_rgb->width != rays->width || d_rgb->height != rays->height)
@@ -370,13 +368,7 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
     if (scene->listed)
         GBT_TRY(view_lists_reserve_slots(&scene->lists, err));
     GBT_TRY(run_pass(&p, err));
-    GBT_TRY(reduce(&p, d_gaussians, weight, err));
-    for (int c = 0; c < 3 && d_background != NULL; c++) {
-        d_background[c] = 0;
-        for (size_t i = 0; i < scene->tile_count; i++)
-            d_background[c] += scene->tiles[i].d_background[c];
-    }
-    return GBT_OK;
+    return reduce(&p, d_gaussians, weight, err);
 }
 
 void trace_scene_free(trace_scene *scene)

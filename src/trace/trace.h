@@ -101,17 +101,16 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
 /**
  * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Once: the tape is given back.
  *
- * @param d_rgb        [in]  dL/d(rgb), size of `rays`
- * @param d_gaussians  [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
- *                           tangent)
- * @param weight       [out] optional (NULL), [count]: sum over rays of T alpha, how much each Gaussian was
- *                           seen
- * @param d_background [out] optional (NULL), [3], overwritten
+ * @param d_rgb       [in]  dL/d(rgb), size of `rays`
+ * @param d_gaussians [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion
+ *                          tangent)
+ * @param weight      [out] optional (NULL), [count]: sum over rays of T alpha, how much each Gaussian was
+ *                          seen
  * @return as trace_forward(); GBT_ERR_ARGUMENT also without such a forward pass before
  * Threads: uses all; same bits for every thread count (sums run in the order of packets and blocks).
  */
 gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image *d_rgb,
-                          gaussians *d_gaussians, float *weight, float d_background[3], gbt_error *err);
+                          gaussians *d_gaussians, float *weight, gbt_error *err);
 
 void trace_scene_free(trace_scene *scene);
 

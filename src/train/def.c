@@ -11,8 +11,6 @@
 #include "train/rules.h"
 #include "train/settings.h"
 
-static const double default_budget_seconds = 600;
-
 gbt_train_def gbt_train_def_default(void)
 {
     gbt_train_def def = {.command = "", .cookie_ = DEF_COOKIE};
@@ -45,7 +43,7 @@ void train_def_settle(gbt_train_def *d)
 {
     const train_rules rules = train_rules_of(d);
     if (d->budget_seconds == 0)
-        d->budget_seconds = default_budget_seconds;
+        d->budget_seconds = TRAIN_BUDGET_SECONDS;
     if (d->offsets == 0)
         d->offsets = rules.offsets;
     if (d->scale_factor == 0) {
@@ -54,7 +52,7 @@ void train_def_settle(gbt_train_def *d)
     }
     if (!rules.uses_footprint)
         d->footprint = 0;
-    if (!rules.uses_near)
+    if (rules.near_depth > 0)
         d->near = 0;
 }
 

@@ -10,6 +10,9 @@
     (docs/training.md). */
 #define TRAIN_SPACING_SCALE 0.7
 
+/** Of a run that is given neither a budget nor iterations. */
+#define TRAIN_BUDGET_SECONDS 600.0
+
 /** GBT_OK, or GBT_ERR_ARGUMENT and the field that is out of its range. */
 gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
 

@@ -13,7 +13,7 @@ enum { NEARER_VIEWS = 20 /* one in so many may be nearer to things */ };
 
 float view_near(float t_near, const gbt_train_def *def, const scene_view *view)
 {
-    const double share = train_rules_of(def).uses_near ? def->near : 0;
+    const double share = train_rules_of(def).near_depth == 0 ? def->near : 0;
     return share > 0 && view->nearest > 0 ? fminf(t_near, (float)(share * view->nearest)) : t_near;
 }
 

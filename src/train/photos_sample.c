@@ -54,7 +54,7 @@ static bool pick_camera(const gbt_camera *full, const photo_sample *sample, phot
 static void pick_pixels(const photos *p, size_t view, int full_width, const photo_pick *from,
                         const float *backdrop, image *out)
 {
-    const float behind = p->source->views[view].alpha == SCENE_ALPHA_WHITE;
+    const float behind = p->source->views[view].alpha == GBT_ALPHA_WHITE;
     float change[3] = {0, 0, 0};
     for (int c = 0; c < 3 && backdrop != NULL; c++)
         change[c] = backdrop[c] - behind;

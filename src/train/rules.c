@@ -15,7 +15,6 @@ static train_rules own_rules(const gbt_train_def *def)
         .ball_scale_factor = 2, /* the balls' scale prior is smaller than their spacing */
         .spacing_scale_factor = TRAIN_SPACING_SCALE,
         .uses_footprint = true,
-        .uses_near = true,
         .recentres = true,
         .limits_width = true,
         .finds_exposure = true,

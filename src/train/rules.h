@@ -19,12 +19,11 @@ typedef struct train_rules {
     int offsets;                                    /* Gaussians per anchor */
     double ball_scale_factor, spacing_scale_factor; /* of first scales from balls, from spacing */
     bool uses_footprint;                            /* rays as wide as pixels */
-    bool uses_near;                                 /* nothing nearer than the sparse points let it be */
 
     /* the start */
     bool recentres;              /* local coordinates begin in the middle of the points; else the cells of
                                     voxels and of growth are where the world's coordinates put them */
-    float near_depth;            /* scene units: nothing nearer, where uses_near does not say */
+    float near_depth;            /* scene units: nothing nearer; 0: than the sparse points let it be */
     bool limits_width;           /* of photos_usual_downscale() */
     bool finds_exposure;         /* exposure is learned where photos differ in it */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */

@@ -153,10 +153,9 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         c->next_eval++;
     }
     stop = stop || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
-    const bool asked = def->save_at_step > 0 && t->step == def->save_at_step;
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);
-    if (stop || due || asked) {
+    if (stop || due) {
         GBT_TRY(save_finish(c->saving, err));
         const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
         GBT_TRY(at_once ? save_all(t, paths, err) : save_begin(c->saving, t, paths, err));
@@ -200,11 +199,8 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
-    size_t hits = def->hit_bytes_max;
-    if (def->memory > 0 && hits > def->memory / 8)
-        hits = def->memory / 8;
-    for (size_t i = 0; i < t->view_count; i++) /* there 0 is no limit */
-        t->views[i].frame.scene.tape_bytes_max = hits >= t->view_count ? hits / t->view_count : 1;
+    for (size_t i = 0; i < t->view_count; i++) /* there, too, 0 is no limit */
+        t->views[i].frame.scene.tape_bytes_max = def->memory / 8 / t->view_count;
     if (t->step == 0)
         t->seconds = clock_wall() - begin; /* loading counts */
     return GBT_OK;

@@ -116,8 +116,6 @@ static const gbt_train_setting settings[] = {
      .rare = true, .help = "multiply all learning rates"},
     {NAMED("save-every-seconds", save_every_seconds), .option = "save-every", RANGE(SECONDS, 0, 1e9, "TIME"),
      .number = 120, .help = "time between checkpoints; 0: only at the end"},
-    {NAMED("save-at-step", save_at_step), RANGE(UINT64, 0, 0, "N"), .rare = true,
-     .help = "one more checkpoint right after this step; 0: none"},
     {NAMED("stop-at-step", stop_at_step), RANGE(UINT64, 0, 0, "N"), .rare = true,
      .help = "stop, as an interrupt would, after this step; 0: never"},
     {NAMED("tensorboard", tensorboard), FLAG, .rare = true,
@@ -131,9 +129,6 @@ static const gbt_train_setting settings[] = {
      .help = "store the model without loss (see compress); the file is about seven times larger"},
     {NAMED("memory", memory), RANGE(BYTES, 0, 0x1p60, "BYTES"),
      .help = "memory to take at most, such as 4G (docs/memory.md); does not change the result; 0: no limit"},
-    {NAMED("hit-bytes-max", hit_bytes_max), RANGE(BYTES, 0, 0x1p60, "BYTES"), .rare = true, .number = 0x1p60,
-     .help = "memory for ray hits kept for the backward pass, such as 100M; hits beyond it are traced again; "
-             "does not change the result; default: no limit"},
 };
 
 enum { SETTING_COUNT = sizeof settings / sizeof *settings };

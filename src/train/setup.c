@@ -155,7 +155,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
-    if (t->rules.uses_near) {
+    if (t->rules.near_depth == 0) {
         GBT_TRY(scene_near(&t->scene, t->train_views, t->train_count, def->near, &t->settings.t_near, err));
         t->settings.t_near = fmaxf(t->settings.t_near, 0.02f * median);
     } else {

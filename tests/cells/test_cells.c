@@ -112,7 +112,7 @@ static double largest_difference(both *b, const gbt_camera *camera)
     image cells = {0};
     const ray_shot shot = ray_shot_of(camera);
     b->whole.draw.footprint = b->variance;
-    assert_ok(frame_render_shot(&b->whole, frame_plain(&b->cloud), &shot, &b->settings, NULL));
+    assert_ok(frame_render_with(&b->whole, frame_plain(&b->cloud), &shot, &b->settings, NULL, NULL));
     assert_ok(cell_draw(&b->drawer, &b->store, &shot, &b->settings, b->variance, plenty, &cells, NULL));
     assert_int_equal(cells.width, camera->width);
     double largest = 0;

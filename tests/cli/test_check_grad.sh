@@ -27,9 +27,9 @@ check() {
         [ "$(sed -n 's/^\([a-z-]*\)  *[a-z ]*[a-z]  *[0-9.e-]*  *[0-9.e-]*$/\1/p' out | uniq | tr '\n' ' ')" = "$stages " ]
     report $? "$name" "  wanted 0 and $stages, got $got: $(cat err out)"
 }
-check "a run of splats and rays" made "rasterizer tracer decode chain"
+check "a run of splats and rays" made "rasterizer tracer decode chain" --splats-until 0.7
 cp run/model.gbt small.gbt
-check "rays alone, no footprint" made "rasterizer tracer decode chain" --splats-until 0 --footprint 0
+check "rays alone, no footprint" made "rasterizer tracer decode chain" --footprint 0
 check "a run by splats" made "rasterizer tracer decode chain" --renderer raster
 check "a run by splats at each ray" made "rasterizer per-ray tracer decode chain" --renderer per-ray
 check "the reference method" made "rasterizer tracer decode chain" --compat --voxel-size 0.02

@@ -5,7 +5,6 @@
 
 #include "test_support.h"
 
-#include <ftw.h>
 #include <math.h>
 #include <unistd.h>
 
@@ -14,6 +13,7 @@
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 #include "data/raw.h"
+#include "remove_tree.h"
 
 /** Calls with a visible message on failure. */
 #define must(call)                                                                                           \
@@ -23,14 +23,6 @@
         if (must_status_ != GBT_OK)                                                                          \
             fail_msg("%s: status %d: %s", #call, (int)must_status_, err.text);                               \
     } while (0)
-
-static inline int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info;
-    (void)kind;
-    (void)walk;
-    return remove(path);
-}
 
 /** cmocka set-up and tear-down: *state is the path of an empty folder. */
 static inline int make_temporary(void **state)
@@ -44,7 +36,7 @@ static inline int make_temporary(void **state)
 
 static inline int remove_temporary(void **state)
 {
-    nftw(*state, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+    remove_tree(*state);
     free(*state);
     return 0;
 }

@@ -697,14 +697,14 @@ static void blender_folder(void **state)
         for (size_t v = 0; v < s.view_count; v++) {
             const bool is_train = strcmp(s.views[v].name, "train/r_0") == 0;
             assert_int_equal(s.views[v].is_test, i > 0 && !is_train);
-            assert_int_equal(s.views[v].alpha, SCENE_ALPHA_BLACK);
+            assert_int_equal(s.views[v].alpha, GBT_ALPHA_AUTO);
         }
         if (i > 0)
             assert_string_equal(s.views[i == 1].name, i == 1 ? "val/r_0" : "test/r_0");
         assert_true(fabs(s.views[0].camera.params[0] - 4 / tan(0.39269908169872414)) < 1e-12 &&
                     s.views[0].camera.params[3] == 3);
         scene_set_alpha(&s, GBT_ALPHA_AUTO);
-        assert_int_equal(s.views[0].alpha, SCENE_ALPHA_WHITE);
+        assert_int_equal(s.views[0].alpha, GBT_ALPHA_WHITE);
         scene_free(&s);
     }
     /* Another split replaces the data set's. */
@@ -950,7 +950,7 @@ static void photo_alpha_and_nan(void **state)
 static void alpha_of_an_exr(void **state)
 {
     const char *folder = *state;
-    static const scene_alpha kinds[] = {SCENE_ALPHA_BLACK, SCENE_ALPHA_WHITE, SCENE_ALPHA_MASK};
+    static const gbt_alpha kinds[] = {GBT_ALPHA_BLACK, GBT_ALPHA_WHITE, GBT_ALPHA_MASK};
     static const float pixels[16] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f, 0.2f, 0.4f, 1, 0.8f, 0, 0, 0, 0},
                        glow = 0.5f;
     char path[2][4096];
@@ -973,7 +973,7 @@ static void alpha_of_an_exr(void **state)
             must(scene_read_photo_valid(&view, 4, 1, &read[exr], &valid[exr], &err));
         }
         for (int i = 0; i < 4; i++) {
-            const bool counts = kinds[k] != SCENE_ALPHA_MASK || pixels[4 * i + 3] >= 0.5f;
+            const bool counts = kinds[k] != GBT_ALPHA_MASK || pixels[4 * i + 3] >= 0.5f;
             for (int exr = 0; exr < 2; exr++)
                 assert_true((valid[exr] == NULL || valid[exr][i]) == counts);
             for (int c = 0; c < 3 && counts; c++) {
@@ -1005,18 +1005,18 @@ static void masked_photos(void **state)
     static const struct {
         int width, height;
         float values[8];
-        scene_alpha alpha;
+        gbt_alpha alpha;
         unsigned valid;
     } cases[] = {
-        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, SCENE_ALPHA_BLACK, 0xbd},
-        {4, 2, {0.004f, 0, 0.004f, 0.004f, 0.004f, 0.004f, 0, 0.004f}, SCENE_ALPHA_BLACK, 0xbd},
-        {4, 2, {0.97f, 0.04f, 1, 0.5f, 0.99f, 0.6f, 0.49f, 1}, SCENE_ALPHA_BLACK, 0xbd},
-        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, SCENE_ALPHA_MASK, 0x9d},
-        {4, 2, {0}, SCENE_ALPHA_BLACK, 0},
-        {2, 1, {1, 0}, SCENE_ALPHA_WHITE, 0x33},
-        {0, 0, {0}, SCENE_ALPHA_MASK, 0xdf}, /* no mask */
-        {0, 0, {0}, SCENE_ALPHA_WHITE, 0xff},
-        {2, 8, {0}, SCENE_ALPHA_WHITE, 0x100}, /* another aspect */
+        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, GBT_ALPHA_BLACK, 0xbd},
+        {4, 2, {0.004f, 0, 0.004f, 0.004f, 0.004f, 0.004f, 0, 0.004f}, GBT_ALPHA_BLACK, 0xbd},
+        {4, 2, {0.97f, 0.04f, 1, 0.5f, 0.99f, 0.6f, 0.49f, 1}, GBT_ALPHA_BLACK, 0xbd},
+        {4, 2, {1, 0, 1, 1, 1, 1, 0, 1}, GBT_ALPHA_MASK, 0x9d},
+        {4, 2, {0}, GBT_ALPHA_BLACK, 0},
+        {2, 1, {1, 0}, GBT_ALPHA_WHITE, 0x33},
+        {0, 0, {0}, GBT_ALPHA_MASK, 0xdf}, /* no mask */
+        {0, 0, {0}, GBT_ALPHA_WHITE, 0xff},
+        {2, 8, {0}, GBT_ALPHA_WHITE, 0x100}, /* another aspect */
     };
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
         scene_view view = {
@@ -1038,9 +1038,9 @@ static void masked_photos(void **state)
             if ((valid == NULL || valid[i]) != (cases[k].valid >> i & 1))
                 fail_msg("case %zu, pixel %u", k, i);
         if (status == GBT_OK) {
-            const float want = cases[k].alpha == SCENE_ALPHA_BLACK   ? 0.08f
-                               : cases[k].alpha == SCENE_ALPHA_WHITE ? 0.68f
-                                                                     : 0.2f;
+            const float want = cases[k].alpha == GBT_ALPHA_BLACK   ? 0.08f
+                               : cases[k].alpha == GBT_ALPHA_WHITE ? 0.68f
+                                                                   : 0.2f;
             assert_true(fabsf(im.pixels[3 * 5] - want) < 1e-6f && fabsf(im.pixels[0] - 0.2f) < 1e-6f);
         }
         mem_free(valid);

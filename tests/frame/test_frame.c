@@ -127,7 +127,7 @@ static void nothing_reached_is_left_out(void **state)
             static double sum[3 * W * H];
             memset(sum, 0, sizeof sum);
             const ray_shot shot = random_shot(seed * KINDS + (uint64_t)kind, kind, &given);
-            assert_ok(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
+            assert_ok(frame_render_with(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, NULL));
             left_out[kind] += ANCHORS - f.visible_count;
             assert_ok(decode_forward(&w.a, &w.d, f.eye, all, ANCHORS, w.s.alpha_min, &g, &tape, NULL));
             assert_ok(trace_build(&scene, &g, &w.s, 20, NULL));
@@ -197,7 +197,7 @@ static void a_camera_is_a_shot(void **state)
     frame a = {0}, b = {0};
     const ray_shot shot = random_shot(5, 0, NULL);
     assert_ok(frame_render(&a, frame_neural(&w.a, &w.d), &shot.camera, &w.s, true, NULL));
-    assert_ok(frame_render_shot(&b, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
+    assert_ok(frame_render_with(&b, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, NULL));
     assert_memory_equal(a.rgb.pixels, b.rgb.pixels, 3 * W * H * sizeof(float));
     for (int k = 0; k < 3; k++)
         assert_true(a.eye[k] == (float)shot.camera.center[k]);
@@ -228,7 +228,7 @@ static void a_tracer_of_the_caller(void **state)
         const ray_shot shot = random_shot(200 + (uint64_t)kind, kind, &given);
         const frame_tracer tracer = {.trace = plain_tracer, .context = &calls, .reach = 30};
         w.a.position[0] = NAN; /* an anchor that is nowhere is not decoded */
-        assert_ok(frame_render_shot(&a, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
+        assert_ok(frame_render_with(&a, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, NULL));
         assert_ok(frame_render_with(&b, frame_neural(&w.a, &w.d), &shot, &w.s, &tracer, NULL));
         assert_int_equal(b.visible_count, ANCHORS - 1);
         assert_int_equal(calls, ray_shot_sample_count(&shot));
@@ -252,7 +252,7 @@ static void same_bits_for_every_thread_count(void **state)
             ray_image given = {0};
             const ray_shot shot = random_shot(100 + (uint64_t)kind, kind, &given);
             parallel_set_threads(t == 2 ? 7 : t + 1);
-            assert_ok(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
+            assert_ok(frame_render_with(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, NULL));
             hash[t] = hash_bytes(0, f.rgb.pixels, 3 * W * H * sizeof(float));
             frame_free(&f);
             ray_image_free(&given);
@@ -272,14 +272,15 @@ static void no_rays(void **state)
     ray_image given = {0};
     ray_shot shot = random_shot(8, 8, &given);
     memset(given.dir, 0, 3 * W * H * sizeof *given.dir);
-    assert_ok(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL));
+    assert_ok(frame_render_with(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, NULL));
     for (size_t i = 0; i < 3 * W * H; i++)
         assert_true(f.rgb.pixels[i] == w.s.background[i % 3]);
     shot.given = NULL;
     shot.aperture_radius = 1;
     shot.focus_distance = 0;
     gbt_error err = {0};
-    assert_int_equal(frame_render_shot(&f, frame_neural(&w.a, &w.d), &shot, &w.s, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(frame_render_with(&f, frame_neural(&w.a, &w.d), &shot, &w.s, NULL, &err),
+                     GBT_ERR_ARGUMENT);
     assert_string_equal(err.text, "camera: focus distance 0 (wanted > 0, as there is an aperture)");
     frame_free(&f);
     ray_image_free(&given);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/image.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 #include "data/colmap_bin.h"
 #include "data/colmap_txt.h"
@@ -183,16 +184,16 @@ void fuzz_path(const source_file *file)
 void fuzz_photo(const source_file *file)
 {
     const char *path = as_file(file);
-    int width, height, channels;
+    image_header h;
     image out;
     gbt_error err = {0}, second = {0};
-    const gbt_status header = image_probe(path, &width, &height, &channels, &err),
-                     status = header == GBT_OK && (int64_t)width * height > 1 << 20
+    const gbt_status header = image_header_read(path, &h, &err),
+                     status = header == GBT_OK && (int64_t)h.width * h.height > 1 << 20
                                   ? GBT_ERR_NO_MEMORY /* fine, but slow */
                                   : image_read(path, &out, &second);
     check(header, &err);
     if (status == GBT_OK) {
-        if (header != GBT_OK || out.width != width || out.height != height)
+        if (header != GBT_OK || out.width != h.width || out.height != h.height)
             abort();
         image_free(&out);
     }

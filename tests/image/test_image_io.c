@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "base/image.h"
+#include "base/image_header.h"
 #include "base/memory.h"
 
 static char folder[] = "/tmp/gbt_image_XXXXXX";
@@ -167,11 +168,11 @@ static void reads_png(void **state)
             fail_msg("%s: value %d is %.9g, not %.9g", c->name, i, (double)im.pixels[i],
                      (double)c->pixels[i]);
     image_free(&im);
-    int width, height, channels;
-    assert_ok(image_probe(at("a.jpg"), &width, &height, &channels, &assert_ok_err_));
-    assert_int_equal(width, c->width);
-    assert_int_equal(height, 1);
-    assert_int_equal(channels, c->channels);
+    image_header header;
+    assert_ok(image_header_read(at("a.jpg"), &header, &assert_ok_err_));
+    assert_int_equal(header.width, c->width);
+    assert_int_equal(header.height, 1);
+    assert_int_equal(header.has_alpha, c->channels == 4);
 }
 
 static void expect_failure(const char *path, gbt_status wanted, const char *text)
@@ -191,16 +192,16 @@ static void expect_failure(const char *path, gbt_status wanted, const char *text
 static void refuses_what_is_not_an_image(void **state)
 {
     (void)state;
-    int width = 7, height = 7, channels = 7;
+    image_header header = {.width = 7};
     gbt_error err = {0};
     expect_failure(at("nothing.png"), GBT_ERR_IO, "cannot open");
-    assert_int_equal(image_probe(at("nothing.png"), &width, &height, &channels, &err), GBT_ERR_IO);
-    assert_int_equal(width, 0);
+    assert_int_equal(image_header_read(at("nothing.png"), &header, &err), GBT_ERR_IO);
+    assert_int_equal(header.width, 0);
     expect_failure(folder, GBT_ERR_IO, "not a regular file");
     assert_int_equal(mkfifo(at("fifo.png"), 0600), 0);
     expect_failure(at("fifo.png"), GBT_ERR_IO, "not a regular file");
     err = (gbt_error){0};
-    assert_int_equal(image_probe(at("fifo.png"), &width, &height, &channels, &err), GBT_ERR_IO);
+    assert_int_equal(image_header_read(at("fifo.png"), &header, &err), GBT_ERR_IO);
     static const char *const contents[] = {
         "", "\x89PNG", "<html>404</html>", "GIF89a\1\0\1\0\0\0\0;", "P6 1 1 255 aaa", "\xff\xd8"};
     for (size_t i = 0; i < sizeof contents / sizeof *contents; i++) {
@@ -209,7 +210,7 @@ static void refuses_what_is_not_an_image(void **state)
         save("b.png", &b);
         expect_failure(at("b.png"), GBT_ERR_FORMAT, "not a PNG, JPEG or EXR file");
         err = (gbt_error){0};
-        assert_int_equal(image_probe(at("b.png"), &width, &height, &channels, &err), GBT_ERR_FORMAT);
+        assert_int_equal(image_header_read(at("b.png"), &header, &err), GBT_ERR_FORMAT);
     }
 }
 
@@ -370,9 +371,9 @@ static void exr_round_trip_is_exact(void **state)
         0.0f; /* what is not finite is read as 0, with one warning */
     assert_memory_equal(back.pixels, im.pixels, 37 * 23 * 3 * sizeof(float));
     image_free(&back);
-    int width, height, channels;
-    assert_ok(image_probe(at("f.exr"), &width, &height, &channels, &assert_ok_err_));
-    assert_int_equal(width * 10000 + height * 10 + channels, 370233);
+    image_header header;
+    assert_ok(image_header_read(at("f.exr"), &header, &assert_ok_err_));
+    assert_true(header.width == 37 && header.height == 23 && !header.has_alpha);
     unsigned char *bytes;
     size_t count;
     assert_ok(file_read(at("f.exr"), &bytes, &count, &assert_ok_err_));
@@ -517,20 +518,21 @@ static void reads_real_photos(void **state)
     const char *path = shared_path("data/castle/images/0000.jpg");
     if (path == NULL)
         skip();
-    int width, height, channels;
-    assert_ok(image_probe(path, &width, &height, &channels, &assert_ok_err_));
+    image_header header;
+    assert_ok(image_header_read(path, &header, &assert_ok_err_));
     image im;
     assert_ok(image_read(path, &im, &assert_ok_err_));
-    assert_int_equal(im.width, width);
-    assert_int_equal(im.height, height);
-    assert_int_equal(im.channels, channels);
-    assert_int_equal(channels, 3);
+    assert_int_equal(im.width, header.width);
+    assert_int_equal(im.height, header.height);
+    assert_int_equal(im.channels, 3);
+    assert_false(header.has_alpha);
     double sum = 0;
-    for (size_t i = 0; i < (size_t)width * (size_t)height * 3; i++) {
+    const size_t count = (size_t)im.width * (size_t)im.height * 3;
+    for (size_t i = 0; i < count; i++) {
         assert_true(im.pixels[i] >= 0.0f && im.pixels[i] <= 1.0f);
         sum += (double)im.pixels[i];
     }
-    assert_true(sum > 0.05 * width * height * 3 && sum < 0.95 * width * height * 3);
+    assert_true(sum > 0.05 * (double)count && sum < 0.95 * (double)count);
     image_free(&im);
 }
 

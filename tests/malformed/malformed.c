@@ -18,6 +18,8 @@
 
 #include <zlib.h>
 
+#include "remove_tree.h"
+
 enum { WORDS_MAX = 40, PATH_MAX_BYTES = 512, OUTPUT_BYTES = 1 << 16 };
 
 static char work[PATH_MAX_BYTES], program[4096];
@@ -289,14 +291,6 @@ static int count_entry(const char *path, const struct stat *info, int kind, stru
     return 0;
 }
 
-static int remove_entry(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info;
-    (void)kind;
-    (void)walk;
-    return remove(path);
-}
-
 static void count_files(const char *folder)
 {
     file_count = temporary_count = 0;
@@ -374,7 +368,7 @@ static bool run_row(const row *r, bool show)
                r->code, r->words, code, file_count, before, said);
     else if (show)
         printf("%s: %d %.600s", r->name, code, said);
-    nftw(folder, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+    remove_tree(folder);
     return why == NULL;
 }
 
@@ -405,7 +399,7 @@ int main(int count, char **arguments)
         done++;
     }
     fclose(cases);
-    nftw(work, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+    remove_tree(work);
     printf("%zu inputs, %zu failed\n", done, failed);
     return failed > 0;
 }

@@ -79,7 +79,7 @@ static inline gbt_camera make_camera(int width, int height, const double center[
 /* One view, forward and back. */
 typedef struct drawn {
     image rgb;
-    float *T, *weight, d_background[3];
+    float *T, *weight;
     gaussians d;
     raster_counters counters;
 } drawn;
@@ -103,7 +103,7 @@ static inline drawn draw(const gaussians *g, const gbt_camera *camera, const ras
     out.weight = mem_alloc(g->count, sizeof *out.weight, "test", NULL);
     assert_ok(raster_forward(&scene, g, camera, s, d_rgb != NULL, &out.rgb, out.T, &out.counters, NULL));
     if (d_rgb != NULL)
-        assert_ok(raster_backward(&scene, d_rgb, &out.d, out.weight, out.d_background, NULL));
+        assert_ok(raster_backward(&scene, d_rgb, &out.d, out.weight, NULL));
     raster_scene_free(&scene);
     return out;
 }

@@ -37,7 +37,6 @@ static float reach_of(const gbt_camera *camera)
 typedef struct traced {
     image rgb;
     gaussians d;
-    float d_background[3];
 } traced;
 
 /* Without `d_rgb` the picture alone. */
@@ -52,7 +51,7 @@ static traced trace_view(const gaussians *g, const gbt_camera *camera, const tra
     assert_ok(trace_build(&scene, g, s, reach_of(camera), NULL));
     assert_ok(trace_forward(&scene, &rays, d_rgb != NULL, &(trace_outputs){.rgb = &out.rgb}, NULL, NULL));
     if (d_rgb != NULL)
-        assert_ok(trace_backward(&scene, &rays, d_rgb, &out.d, NULL, out.d_background, NULL));
+        assert_ok(trace_backward(&scene, &rays, d_rgb, &out.d, NULL, NULL));
     trace_scene_free(&scene);
     ray_image_free(&rays);
     return out;
@@ -131,9 +130,6 @@ static void agrees_with_the_tracer(void **state)
         for (size_t k = 0; k < sizeof error / sizeof *error; k++)
             if (!(error[k] <= 1e-3))
                 fail_msg("%s: gradients of class %zu off by %g", clouds[i].name, k, error[k]);
-        for (int c = 0; c < 3; c++)
-            assert_near((double)got.d_background[c], (double)wanted.d_background[c],
-                        1e-4 * fmax(1, fabs((double)wanted.d_background[c])));
         traced_free(&wanted);
         drawn_free(&got);
         image_free(&d_rgb);
@@ -158,13 +154,13 @@ static void a_thin_sheet_keeps_its_gradients(void **state)
         g.opacity[0] = 0.5f;
         image d_rgb = random_image(camera.width, camera.height, seed);
         const size_t floats = 3 * (size_t)camera.width * (size_t)camera.height;
-        double *d = mem_alloc(floats, sizeof *d, "test", NULL), wanted[GAUSSIANS_FIELD_COUNT] = {0},
-               d_background[3] = {0}, off = 0, all = 0;
+        double *d = mem_alloc(floats, sizeof *d, "test", NULL), wanted[GAUSSIANS_FIELD_COUNT] = {0}, off = 0,
+               all = 0;
         for (size_t i = 0; i < floats; i++)
             d[i] = (double)d_rgb.pixels[i];
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        assert_ok(reference_backward(&g, &traced_settings, &rays, d, NULL, wanted, d_background, NULL));
+        assert_ok(reference_backward(&g, &traced_settings, &rays, d, NULL, wanted, NULL));
         drawn got = draw(&g, &camera, &s, &d_rgb);
         float *f[GAUSSIANS_FIELD_COUNT];
         field_list(&got.d, f);
@@ -237,18 +233,14 @@ static void order_by_center(void **state)
         by_center = s;
         by_center.order_by_center = true;
         const gbt_camera camera = make_camera(def.width, def.height, def.camera);
-        image d_rgb = random_image(def.width, def.height, 1);
-        drawn a = draw(&g, &camera, &s, &d_rgb), b = draw(&g, &camera, &by_center, &d_rgb);
+        drawn a = draw(&g, &camera, &s, NULL), b = draw(&g, &camera, &by_center, NULL);
         const bool same = memcmp(a.rgb.pixels, b.rgb.pixels, 3 * 1600 * sizeof(float)) == 0;
         assert_int_equal(same, count == 1);
         /* What is left for the background is a product of the same numbers in another order. */
         for (size_t i = 0; i < 1600; i++)
             assert_near((double)b.T[i], (double)a.T[i], 1e-5 * (double)a.T[i]);
-        for (int c = 0; c < 3; c++)
-            assert_near((double)b.d_background[c], (double)a.d_background[c], 1e-4);
         drawn_free(&a);
         drawn_free(&b);
-        image_free(&d_rgb);
         gaussians_free(&g);
     }
 }

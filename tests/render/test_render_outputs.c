@@ -42,8 +42,8 @@ static loaded_run *random_run(const ray_shot *shot)
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             r->model.anchors.scale_log[6 * i + k] = -2.5f;
-    assert_ok(frame_render_shot(&r->frame, frame_neural(&r->model.anchors, &r->model.decoder), shot,
-                                &r->settings, NULL));
+    assert_ok(frame_render_with(&r->frame, frame_neural(&r->model.anchors, &r->model.decoder), shot,
+                                &r->settings, NULL, NULL));
     return r;
 }
 

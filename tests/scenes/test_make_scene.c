@@ -3,7 +3,6 @@
    its refusals. */
 #include "test_support.h"
 
-#include <ftw.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -16,16 +15,9 @@
 #include "data/gaussian_ply.h"
 #include "data/scene.h"
 #include "gbtrace/make_scene.h"
+#include "remove_tree.h"
 
 static char root[64];
-
-static int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info;
-    (void)kind;
-    (void)walk;
-    return remove(path);
-}
 
 static int make_root(void **state)
 {
@@ -37,7 +29,7 @@ static int make_root(void **state)
 static int remove_root(void **state)
 {
     (void)state;
-    return nftw(root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+    return remove_tree(root);
 }
 
 static const char *under_root(const char *name)

@@ -187,9 +187,9 @@ static void names_and_folders(void **state)
 
 enum { SEEDS = 2 };
 
-static lab_paper_def small_paper(const char *const *data, const char *tables)
+static lab_runs_def small_paper(const char *const *data, const char *tables)
 {
-    lab_paper_def def = lab_paper_def_default();
+    lab_runs_def def = lab_runs_def_default();
     def.data = data;
     def.data_count = 1;
     def.iterations = 40;
@@ -198,7 +198,7 @@ static lab_paper_def small_paper(const char *const *data, const char *tables)
     return def;
 }
 
-static void paper_ok(const lab_paper_def *def, const char *folder)
+static void paper_ok(const lab_runs_def *def, const char *folder)
 {
     gbt_error err = {0};
     FILE *out = tmpfile();
@@ -336,7 +336,7 @@ static void the_papers_tables(void **state)
 {
     (void)state;
     const char *data[] = {tiny};
-    const lab_paper_def def = small_paper(data, "1,2");
+    const lab_runs_def def = small_paper(data, "1,2");
     paper_ok(&def, in_root("paper"));
     check_csv("paper");
     check_json("paper");
@@ -365,7 +365,7 @@ static void lpips_of_finished_runs(void **state)
 {
     (void)state;
     const char *data[] = {tiny};
-    lab_paper_def def = small_paper(data, "1,2");
+    lab_runs_def def = small_paper(data, "1,2");
     network alex = make_alex();
     write_network(&alex, in_root("alex.safetensors"), NULL);
     free_network(&alex);
@@ -432,7 +432,7 @@ static void runs_are_made_once(void **state)
     /* interrupted */
     assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
     /* and a table more */
-    const lab_paper_def def = small_paper(data, "1,2,4");
+    const lab_runs_def def = small_paper(data, "1,2,4");
     paper_ok(&def, in_root("paper"));
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++) {
@@ -452,7 +452,7 @@ static void runs_are_made_once(void **state)
     mem_free(csv.data);
     mem_free(metrics.data);
 
-    lab_paper_def other = small_paper(data, "1"); /* other settings */
+    lab_runs_def other = small_paper(data, "1"); /* other settings */
     other.iterations++;
     other.seeds = 1;
     paper_ok(&other, in_root("paper"));
@@ -467,16 +467,16 @@ static void bad_requests(void **state)
     const char *data[] = {tiny};
     static const char *const lists[] = {"", "0", "5", "1,1", "1,", ",1", "12", "1 2"};
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
-        const lab_paper_def def = small_paper(data, lists[i]);
+        const lab_runs_def def = small_paper(data, lists[i]);
         assert_int_equal(lab_study_paper(&def, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     }
-    lab_paper_def paper = small_paper(data, "1");
-    paper.seeds = 0;
+    lab_runs_def paper = small_paper(data, "1");
+    paper.seeds = -1;
     assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     paper.seeds = 1;
     paper.iterations = 19;
     assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    lab_time_def time = lab_time_def_default();
+    lab_runs_def time = lab_runs_def_default();
     time.data = data;
     time.data_count = 1;
     time.budget_seconds = 0;
@@ -484,13 +484,13 @@ static void bad_requests(void **state)
     time.budget_seconds = 1;
     time.seeds = 11;
     assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    lab_anchors_def needs = lab_anchors_def_default();
+    lab_runs_def needs = lab_runs_def_default();
     needs.data = data;
     needs.data_count = 1;
     needs.iterations = 19;
     assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     needs.iterations = 20;
-    needs.seeds = 0;
+    needs.seeds = 11;
     assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     assert_false(file_exists(in_root("bad")));
 }
@@ -500,7 +500,7 @@ static void bad_requests(void **state)
 static void time_ok(const char *const *data, const char *folder)
 {
     gbt_error err = {0};
-    lab_time_def def = lab_time_def_default();
+    lab_runs_def def = lab_runs_def_default();
     def.data = data;
     def.data_count = 1;
     def.budget_seconds = 0.1;
@@ -562,7 +562,7 @@ static void what_a_scene_needs(void **state)
 {
     (void)state;
     const char *data[] = {tiny};
-    lab_anchors_def def = lab_anchors_def_default();
+    lab_runs_def def = lab_runs_def_default();
     def.data = data;
     def.data_count = 1;
     def.iterations = 40;

@@ -21,13 +21,12 @@ static inline gbt_status reference_ray_hits(const gaussians *g, const trace_sett
 static inline gbt_status reference_backward(const gaussians *g, const trace_settings *s,
                                             const ray_image *rays, const double *d_rgb,
                                             const double *d_transmittance, double *d_gaussians,
-                                            double d_background[3], gbt_error *err)
+                                            gbt_error *err)
 {
     reference_scene scene;
     gbt_status status = reference_scene_make(g, &scene, err);
     if (status == GBT_OK)
-        status =
-            reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, d_background, err);
+        status = reference_scene_backward(&scene, s, rays, d_rgb, d_transmittance, d_gaussians, err);
     reference_scene_free(&scene);
     return status;
 }

@@ -93,7 +93,7 @@ static pass_result *run(const gaussians *g, const trace_settings *s, const ray_i
                                .strongest = r->strongest};
     assert_ok(trace_build(&scene, g, s, 5, NULL));
     assert_ok(trace_forward(&scene, rays, true, &out, &r->counters, NULL));
-    assert_ok(trace_backward(&scene, rays, &d_rgb, &r->d, NULL, NULL, NULL));
+    assert_ok(trace_backward(&scene, rays, &d_rgb, &r->d, NULL, NULL));
     trace_scene_free(&scene);
     image_free(&d_rgb);
     return r;

@@ -162,14 +162,13 @@ static void nothing_there(void **state)
     float store[6] = {0}; /* a zero direction is no ray, even inside a Gaussian */
     const ray_image rays = {
         .width = 1, .height = 1, .origin = store, .dir = store + 3, .common_origin = true};
-    double rgb[3], T, d[GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0};
+    double rgb[3], T, d[GAUSSIANS_FIELD_COUNT] = {0};
     assert_ok(reference_forward(&g, &s, &rays, rgb, &T, NULL, NULL));
     assert_near(T, 1, 0);
     assert_near(rgb[1], 0.5, 0);
-    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 2, 3}, (double[1]){1}, d, d_background, NULL));
+    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 2, 3}, (double[1]){1}, d, NULL));
     for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
         assert_near(d[f], 0, 0);
-    assert_near(d_background[2], 3, 0);
     gaussians_free(&g);
 }
 
@@ -197,17 +196,17 @@ static void opacity_is_cut_at_alpha_max(void **state)
     gaussians g = some(1, 1);
     float store[6];
     ray_image rays = one_ray(store, 0, 0, -4);
-    double rgb[3], T, d[GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0};
+    double rgb[3], T, d[GAUSSIANS_FIELD_COUNT] = {0};
     assert_ok(reference_forward(&g, &s, &rays, rgb, &T, NULL, NULL));
     assert_near(T, 1 - (double)s.alpha_max, 0);
     store[0] = 0.1f; /* off the centre: without the cut, mean, scale and opacity would all get a gradient */
-    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, (double[1]){1}, d, d_background, NULL));
+    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, (double[1]){1}, d, NULL));
     for (int f = 0; f < REFERENCE_red; f++)
         assert_near(d[f], 0, 0);
     for (int f = REFERENCE_red; f <= REFERENCE_blue; f++)
         assert_near(d[f], (double)s.alpha_max, 0);
     store[0] = 0.2f; /* exp(-0.02) = 0.980: open again */
-    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, d_background, NULL));
+    assert_ok(reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, NULL));
     assert_near(d[REFERENCE_opacity], 3 * exp(-0.02), 1e-7);
     assert_true(d[REFERENCE_mean_x] > 0.1);
     gaussians_free(&g);
@@ -398,14 +397,14 @@ static void gradients_agree_with_differences(void **state)
     static const size_t widths[CLASS_COUNT] = {3, 3, 3, 1, 3};
     static const enum reference_field first[] = {REFERENCE_mean_x, REFERENCE_scale_x, REFERENCE_quat_w,
                                                  REFERENCE_opacity, REFERENCE_red};
-    double worst[CLASS_COUNT] = {0}, worst_background = 0;
+    double worst[CLASS_COUNT] = {0};
     size_t tested[CLASS_COUNT] = {0}, skipped = 0, near_hits = 0, cut_hits = 0, hit_total = 0;
     for (uint64_t seed = 0; seed < SCENES; seed++) {
         random_scene r;
         make_random(&r, seed);
         const size_t n = r.scene.count;
-        double *d = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL), d_background[3] = {0};
-        assert_ok(reference_scene_backward(&r.scene, &r.s, &r.rays, r.d_rgb, &r.d_T, d, d_background, NULL));
+        double *d = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
+        assert_ok(reference_scene_backward(&r.scene, &r.s, &r.rays, r.d_rgb, &r.d_T, d, NULL));
         uint64_t list[LIST_MAX + 2], moved[LIST_MAX + 2];
         hit_list_of(&r, list);
         hit_total += list[0];
@@ -455,16 +454,6 @@ static void gradients_agree_with_differences(void **state)
                                  i, n, names[class], k, got, wanted);
                 }
         }
-        for (int c = 0; c < 3; c++) { /* linear, so a large step is exact */
-            const float keep = r.s.background[c];
-            r.s.background[c] = 2;
-            const double hi = loss(&r);
-            r.s.background[c] = -2;
-            const double lo = loss(&r);
-            r.s.background[c] = keep;
-            worst_background = fmax(worst_background, fabs(d_background[c] - (hi - lo) / 4));
-            assert_near(d_background[c], (hi - lo) / 4, 1e-14);
-        }
         mem_free(d);
         reference_scene_free(&r.scene);
         gaussians_free(&r.g);
@@ -474,8 +463,8 @@ static void gradients_agree_with_differences(void **state)
                       tested[class]);
         assert_true(tested[class] > 500);
     }
-    print_message("background worst %.1e; %zu skipped; %zu hits, %zu at t_near, %zu cut at alpha_max\n",
-                  worst_background, skipped, hit_total, near_hits, cut_hits);
+    print_message("%zu skipped; %zu hits, %zu at t_near, %zu cut at alpha_max\n", skipped, hit_total,
+                  near_hits, cut_hits);
     assert_true(skipped < 20 && near_hits > 20 && cut_hits > 5 && hit_total > 300);
 }
 
@@ -518,19 +507,17 @@ static void float_entries_and_threads(void **state)
     const size_t n = r.g.count;
     double *all = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *all, "test", NULL);
     double *sum = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *sum, "test", NULL);
-    double background[2][3] = {{0}};
-    assert_ok(reference_backward(&r.g, &r.s, &rays, d_rgb, d_T, all, background[0], NULL));
+    assert_ok(reference_backward(&r.g, &r.s, &rays, d_rgb, d_T, all, NULL));
     for (size_t i = 0; i < RAYS; i++) {
         const ray_image one = {
             .width = 1, .height = 1, .origin = origin + 3 * i, .dir = dir + 3 * i, .common_origin = true};
         double rgb_one[3];
         assert_ok(reference_forward(&r.g, &r.s, &one, rgb_one, NULL, NULL, NULL));
         assert_memory_equal(rgb_one, rgb[0] + 3 * i, sizeof rgb_one);
-        assert_ok(reference_backward(&r.g, &r.s, &one, d_rgb + 3 * i, d_T + i, sum, background[1], NULL));
+        assert_ok(reference_backward(&r.g, &r.s, &one, d_rgb + 3 * i, d_T + i, sum, NULL));
     }
     for (size_t i = 0; i < n * GAUSSIANS_FIELD_COUNT; i++)
         assert_near(all[i], sum[i], 0); /* in ray order: the same bits */
-    assert_memory_equal(background[0], background[1], sizeof background[0]);
     mem_free(all);
     mem_free(sum);
     reference_scene_free(&r.scene);
@@ -553,7 +540,7 @@ static void memory_runs_out(void **state)
     gaussians g = some(3, 0.5f);
     float store[6];
     const ray_image rays = one_ray(store, 0, 0, -4);
-    double rgb[3], d[3 * GAUSSIANS_FIELD_COUNT] = {0}, d_background[3] = {0};
+    double rgb[3], d[3 * GAUSSIANS_FIELD_COUNT] = {0};
     const gbt_camera camera = plain_camera();
     for (int entry = 0; entry < 4; entry++) {
         gbt_status status = GBT_ERR_NO_MEMORY;
@@ -567,7 +554,7 @@ static void memory_runs_out(void **state)
             if (entry == 0)
                 status = reference_forward(&g, &s, &rays, rgb, NULL, NULL, &err);
             else if (entry == 1)
-                status = reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, d_background, &err);
+                status = reference_backward(&g, &s, &rays, (double[3]){1, 1, 1}, NULL, d, &err);
             else if (entry == 2)
                 status = reference_ray_hits(&g, &s, (double[3]){0, 0, -4}, (double[3]){0, 0, 1}, &hits,
                                             &count, &capacity, &err);

@@ -8,13 +8,13 @@
 
 #include "test_support.h"
 
-#include <ftw.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/file.h"
 #include "base/memory.h"
 #include "gbtrace/make_scene.h"
+#include "remove_tree.h"
 #include "train/trainer.h"
 
 enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
@@ -22,14 +22,6 @@ enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
 static char root[64], tiny[PATH_SIZE];
 
 /* ---- folders, files ---- */
-
-static inline int remove_one(const char *path, const struct stat *info, int kind, struct FTW *walk)
-{
-    (void)info;
-    (void)kind;
-    (void)walk;
-    return remove(path);
-}
 
 static inline const char *in_root(const char *format, ...)
 {
@@ -103,7 +95,7 @@ static inline int make_root(void **state)
 static inline int remove_root(void **state)
 {
     (void)state;
-    return nftw(root, remove_one, 16, FTW_DEPTH | FTW_PHYS);
+    return remove_tree(root);
 }
 
 /* ---- runs ---- */

@@ -168,13 +168,13 @@ static double loss_of(view *v)
 static void gradient_of(view *v, decode_ref *out)
 {
     loss_of(v);
-    double d_rgb[3 * RAYS], d_background[3] = {0};
+    double d_rgb[3 * RAYS];
     image_term(v->rgb, v->photo.pixels, d_rgb);
     const size_t n = v->g.count;
     double *d = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);
     double *d_slots =
         mem_calloc(v->f.visible_count * OFFSETS, DECODE_REF_FIELDS * sizeof *d_slots, "test", NULL);
-    assert_ok(reference_scene_backward(&v->g, &v->s, &v->f.rays, d_rgb, NULL, d, d_background, NULL));
+    assert_ok(reference_scene_backward(&v->g, &v->s, &v->f.rays, d_rgb, NULL, d, NULL));
     for (size_t i = 0; i < n; i++) {
         double *to = d_slots + v->f.tape.slot[i] * (size_t)DECODE_REF_FIELDS;
         for (size_t k = 0; k < DECODE_REF_FIELDS; k++)

@@ -97,7 +97,7 @@ static int signal_when_saved(const char *run, int number)
         const int status = signal_once(run, number);
         if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
             return status;
-        assert_int_equal(nftw(run, remove_one, 16, FTW_DEPTH | FTW_PHYS), 0);
+        assert_int_equal(remove_tree(run), 0);
     }
     fail_msg("%s: the run always ends before the signal", run);
     return 0;
@@ -137,7 +137,6 @@ static void extra_checkpoints_change_nothing(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.save_every_seconds = 1e-6;
-    def.save_at_step = 7;
     train_ok(tiny, in_root("saves"), &def);
     assert_same_file(straight_run(), in_root("saves/model.gbt"));
     assert_true(file_exists(in_root("saves/checkpoints/last.gbt.prev")));
@@ -148,8 +147,9 @@ static void resumes_from_a_save_beside_the_steps(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    def.save_at_step = 29; /* before anchors grow */
-    train_ok(tiny, in_root("beside"), &def);
+    def.save_every_seconds = 1e-6;
+    def.stop_at_step = 29; /* before anchors grow; it saves, and the copy before it stays */
+    train_fails(tiny, in_root("beside"), &def, GBT_ERR_INTERRUPTED, "after step 29");
     assert_int_equal(remove(in_root("beside/checkpoints/last.gbt")), 0);
     assert_int_equal(remove(in_root("beside/model.gbt")), 0);
     resume_ok(in_root("beside"));
@@ -201,15 +201,34 @@ static void a_signal_saves_and_ends(void **state)
     }
 }
 
+/* Hits beyond the memory for them are traced again for the adjoint. */
+static void memory_for_hits_changes_no_bits(void **state)
+{
+    (void)state;
+    const gbt_train_def def = run_def();
+    trainer t[2];
+    for (int i = 0; i < 2; i++) {
+        open_ok(&t[i], tiny, &def);
+        t[i].views[0].frame.scene.tape_bytes_max = i == 0 ? 0 : 100;
+        step_report r;
+        for (int step = 0; step < 10; step++)
+            step_ok(&t[i], &r);
+        assert_int_equal(t[i].views[0].frame.counters.tape_bytes > 100, i == 0);
+    }
+    assert_memory_equal(t[0].anchors.feature, t[1].anchors.feature,
+                        t[0].anchors.count * ANCHOR_FEATURE_DIM * sizeof(float));
+    assert_memory_equal(t[0].decoder.params, t[1].decoder.params, t[0].decoder.param_count * sizeof(float));
+    for (int i = 0; i < 2; i++)
+        trainer_free(&t[i]);
+}
+
 static void threads_and_memory_do_not_change_bits(void **state)
 {
     (void)state;
     const int before = parallel_threads();
     for (int threads = 1; threads <= 3; threads++) {
         gbt_set_threads(threads);
-        gbt_train_def def = run_def();
-        def.hit_bytes_max =
-            threads == 2 ? 1000 : (size_t)1 << 60; /* almost every tile is traced again for the adjoint */
+        const gbt_train_def def = run_def();
         if (threads == 3) /* anchors in files, whose pages are let go of all the time */
             assert_ok(paged_start("/tmp", 1, NULL));
         train_ok(tiny, in_root("threads%d", threads), &def);
@@ -1717,6 +1736,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(killed_and_resumed_is_straight),
         cmocka_unit_test(resumes_from_the_previous_checkpoint),
         cmocka_unit_test(a_signal_saves_and_ends),
+        cmocka_unit_test(memory_for_hits_changes_no_bits),
         cmocka_unit_test(threads_and_memory_do_not_change_bits),
         cmocka_unit_test(more_memory_than_allowed),
         cmocka_unit_test(another_seed_changes_bits),

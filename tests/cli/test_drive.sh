@@ -181,13 +181,14 @@ done
 code=$?
 [ $code -le 1 ] && [ ! -s err ] && [ "$(grep -c -e '^ok ' -e '^warn ' -e '^fail ' out)" = 11 ] && [ "$(grep -c '^ok   \(tracer\|gradients\|speed\|locale\|folder\|libraries\) ' out)" = 6 ]
 report $? "the doctor" "$(cat err out)"
-GBTRACE_THREDS=1 GBTRACE_THREADS=2 GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
+GBTRACE_THREDS=1 GBTRACE_THREADS=$(($(nproc) + 1)) GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
 [ $? = 1 ] && python3 -c 'import json, sys
 d = json.load(open("out"))
 c = {x["name"]: x for x in d["checks"]}
 assert d["schema"] == 1 and d["failed"] == sum(x["level"] == "fail" for x in d["checks"]) >= 1
 assert c["folder"]["level"] == "fail" and c["folder"]["found"] == "nowhere: no such folder" and c["folder"]["advice"]
 assert c["environment"]["level"] == "warn" and "GBTRACE_THREDS" in c["environment"]["advice"] and c["environment"]["found"].startswith("1 variables set options, 1 ")
+assert c["threads"]["level"] == "warn" and "GBTRACE_THREADS=" in c["threads"]["advice"]
 assert c["processor"]["level"] == "warn" and "GBT_ISA=plain" in c["processor"]["advice"] and c["tracer"]["level"] == c["gradients"]["level"] == "ok"' 2>>err
 report $? "the doctor finds what is wrong" "$(cat err out)"
 finish

@@ -175,6 +175,13 @@ for file in opacity_mlp.pt checkpoints.pth; do
     (cd scaffold && PYTHONPATH=../stubs sh ../command) >out 2>&1 && "$program" import scaffold -o imported >>out 2>&1 && grep -q '^scaffold/point_cloud.ply: 3 anchors with 2 Gaussians each' out
     report $? "and the command for $file does" "$(cat command out)"
 done
+mkdir -p widths/point_cloud/iteration_7 && cp scaffold/point_cloud.ply scaffold/*.safetensors widths/point_cloud/iteration_7
+printf "Namespace(source_path='made', resolution=16)" >widths/cfg_args
+"$program" import widths -o at_width >out 2>err && [ ! -s err ] && "$program" info at_width | grep -q '^  config    downscale = 2$'
+report $? "a width in cfg_args divides the photos of the data set" "$(cat err out; "$program" info at_width)"
+printf "Namespace(source_path='gone', resolution=16)" >widths/cfg_args
+"$program" import widths -o at_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
+report $? "without the data set it is told" "$(cat err out)"
 
 # ---- the doctor
 "$program" doctor >out 2>err

@@ -82,6 +82,12 @@ says "once more it only reports" 0 "^fails: 5 of 5 photos registered" pose "my p
 [ ! -s tools/calls ] && "$program" info fails >out 2>&1 && grep -q '30 found\|5 found' out
 report $? "without COLMAP, and info reads it" "$(cat tools/calls out)"
 says "other options in the same folder" 2 "^error: fails: was begun with other photos or options" pose "my photos" -o fails --matcher sequential
+mkdir swapped && cp "my photos"/*.png swapped/
+says "photos of a folder" 0 "^replaced: 5 of 5 photos registered" pose swapped -o replaced
+cp swapped/0001.png swapped/0002.png
+says "another photo of the same name" 2 "^error: replaced: was begun with other photos or options" pose swapped -o replaced
+sed -i 's/^\(photo = .*\) [0-9]* [0-9]*$/\1/' replaced/colmap/settings
+says "a folder that says names alone" 0 "^replaced: 5 of 5 photos registered" pose swapped -o replaced
 export FALSE_COLMAP=few
 says "some photos are not registered" 0 "^few: 3 of 5 photos registered" pose "my photos" -o few
 grep -q '^  without   0003.png: few matches: 77 with 1 registered photos' out && grep -q '^  without   0004.png: matches no other photo (500 features)' out

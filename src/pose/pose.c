@@ -250,10 +250,9 @@ gbt_status gbt_pose(const char *source, const gbt_pose_def *def, const char *dat
     if (status == GBT_OK)
         status = lock(j, &locked, err);
     if (status == GBT_OK) {
-        stop_signal_guard guard;
-        stop_signal_catch(&guard, NULL, NULL);
+        stop_signal_catch();
         status = run(j, report, err);
-        stop_signal_release(&guard);
+        stop_signal_release();
     }
     if (locked >= 0)
         close(locked);

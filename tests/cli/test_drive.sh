@@ -76,6 +76,10 @@ TERM=dumb on_terminal "$@" && grep -q 'step 3 ' seen && ! grep -q "$over" seen &
 report $? "no such terminal" "$(cat seen)"
 TERM=xterm "$@" >seen 2>&1 && grep -q 'step 3 ' seen && ! grep -q "$over" seen
 report $? "no terminal" "$(cat seen)"
+over=$(printf '\r\033.Kerror: nothing: ')
+TERM=xterm on_terminal "$program" eval nothing
+grep -q "$over" seen && { TERM=dumb on_terminal "$program" eval nothing; grep -q 'error: nothing: ' seen; } && ! grep -q "$over" seen
+report $? "an error is written over progress" "$(cat seen)"
 
 # ---- TensorBoard, read by itself
 python=python3

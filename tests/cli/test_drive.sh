@@ -192,7 +192,7 @@ report $? "without the data set it is told" "$(cat err out)"
 code=$?
 [ $code -le 1 ] && [ ! -s err ] && [ "$(grep -c -e '^ok ' -e '^warn ' -e '^fail ' out)" = 11 ] && [ "$(grep -c '^ok   \(tracer\|gradients\|speed\|locale\|folder\|libraries\) ' out)" = 6 ]
 report $? "the doctor" "$(cat err out)"
-GBTRACE_THREDS=1 GBTRACE_THREADS=$(($(nproc) + 1)) GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
+GBTRACE_THREDS=1 GBTRACE_THREADS=$(($(nproc --all) + 1)) GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
 [ $? = 1 ] && python3 -c 'import json, sys
 d = json.load(open("out"))
 c = {x["name"]: x for x in d["checks"]}

@@ -43,6 +43,8 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED: scores and report are as before.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
+ *
+ * Threads: any, with distinct runs; a signal stops all calls that catch it (gbt_train()).
  */
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err);
 

@@ -32,9 +32,9 @@ gbt_pose_def gbt_pose_def_default(void);
  *                    has none itself), or a film that ffmpeg reads
  * @param data   [in] folder, made when it is not there; may be `source` when the photos are in its images/
  * @param report [in] open stream: what was registered, and what was not and why; NULL: none
- * @return GBT_OK; GBT_ERR_ARGUMENT (DATA holds something else, or was begun with other settings); GBT_ERR_IO
- *         (no colmap or ffmpeg, or one that failed: its log is named); GBT_ERR_FORMAT (no photos, or none
- *         could be registered); GBT_ERR_INTERRUPTED; GBT_ERR_NO_MEMORY
+ * @return GBT_OK; GBT_ERR_ARGUMENT (DATA holds something else, or was begun with other settings or photos);
+ *         GBT_ERR_IO (no colmap or ffmpeg, or one that failed: its log is named); GBT_ERR_FORMAT (no photos,
+ *         or none could be registered); GBT_ERR_INTERRUPTED; GBT_ERR_NO_MEMORY
  *
  * Threads: one call at a time in a process; COLMAP uses as many threads as gbt_set_threads() says.
  */

@@ -21,7 +21,7 @@ typedef struct gbt_event {
     const char *text; /* one line for a person, without newline; borrowed for the call */
     /* Of GBT_EVENT_PROGRESS alone. What is not known is NaN, or 0 where it counts. */
     const char *stage; /* "train", "render", "score", "bake", "refine", "study"; of poses "features", ... */
-    uint64_t done, total; /* steps, views or runs of the stage; total 0: time decides */
+    uint64_t done, total; /* steps, views or runs of the stage; total 0: not known, or time decides */
     double fraction;      /* of the stage, [0, 1] */
     double seconds, seconds_left;
     double psnr; /* dB: of training photos in the mean of late, of the view just scored */

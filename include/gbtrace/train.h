@@ -94,7 +94,8 @@ gbt_train_def gbt_train_def_default(void);
  *
  * `run` gets model.gbt, log.csv, config, data_places, train.json and checkpoints/. What happens meanwhile
  * goes where gbtrace/progress.h says. SIGINT and SIGTERM stop after the current step: a checkpoint is saved
- * and GBT_ERR_INTERRUPTED is returned. The same seed and length give the same model.gbt, bit for bit, for any
+ * and GBT_ERR_INTERRUPTED is returned; a signal more than a second later goes to who handled it before, which
+ * mostly ends the process. The same seed and length give the same model.gbt, bit for bit, for any
  * number of threads, interrupted and resumed or not.
  *
  * After gbt_cluster_open() all its processes call this together: they share the `views` of each step, the
@@ -114,6 +115,8 @@ gbt_train_def gbt_train_def_default(void);
  * one has read its data; a failure before leaves them.
  *
  * @return GBT_OK, or what failed; nothing already in `run` is damaged by a failure
+ *
+ * Threads: one training at a time, beside other calls; a signal stops all calls that catch it.
  */
 gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err);
 

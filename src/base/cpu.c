@@ -2,13 +2,14 @@
 /* base/cpu.c -- choose the instruction set of the kernels at run time. */
 #include "base/cpu.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/log.h"
 
 static const char *const names[CPU_ISA_COUNT] = {"plain", "neon", "avx2", "avx512"};
-static int chosen = -1;
+static atomic_int chosen = -1;
 
 bool cpu_has_isa(cpu_isa isa)
 {
@@ -41,7 +42,8 @@ static cpu_isa within(cpu_isa isa)
 
 cpu_isa cpu_best_isa(void)
 {
-    if (chosen < 0) {
+    int isa = chosen;
+    if (isa < 0) {
         cpu_isa most = CPU_AVX512;
         const char *wanted = getenv("GBT_ISA");
         bool known = wanted == NULL || wanted[0] == '\0';
@@ -52,9 +54,9 @@ cpu_isa cpu_best_isa(void)
             }
         if (!known)
             log_warn("GBT_ISA=%.20s: no instruction set (wanted plain, neon, avx2 or avx512)", wanted);
-        chosen = (int)within(most);
+        chosen = isa = (int)within(most);
     }
-    return (cpu_isa)chosen;
+    return (cpu_isa)isa;
 }
 
 void cpu_limit_isa(cpu_isa isa) { chosen = (int)within(isa); }

@@ -17,15 +17,17 @@ enum { LINE_SIZE = 1024 };
 
 static const double often_seconds = 0.5, line_seconds = 10;
 
-static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* lines of two threads never mix */
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* of all statics; lines of two threads never mix */
 static gbt_listener listener;
 static void *listener_context;
 static bool line_is_open; /* progress stands at the end of the terminal, without a newline */
 
 void gbt_listen(gbt_listener to, void *context)
 {
+    pthread_mutex_lock(&lock);
     listener = to;
     listener_context = context;
+    pthread_mutex_unlock(&lock);
 }
 
 /* Where a line can be written over. */
@@ -51,7 +53,7 @@ static void print_event(const gbt_event *e)
     else
         fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "",
                 e->text);
-    line_is_open = over && e->fraction < 1;
+    line_is_open = over && !(e->fraction >= 1);
     if (over && !line_is_open)
         fputc('\n', stderr);
 }
@@ -90,7 +92,8 @@ void log_info(const char *format, ...)
     va_end(args);
 }
 
-bool log_progress_due(void)
+/* Under the lock. */
+static bool is_due(void)
 {
     static double last = -1;
     const double now = clock_wall(),
@@ -99,6 +102,14 @@ bool log_progress_due(void)
         return false;
     const bool due = last >= 0;
     last = now;
+    return due;
+}
+
+bool log_progress_due(void)
+{
+    pthread_mutex_lock(&lock);
+    const bool due = is_due();
+    pthread_mutex_unlock(&lock);
     return due;
 }
 
@@ -116,22 +127,27 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
         uint64_t done;
         double start;
     } current;
+    pthread_mutex_lock(&lock);
     if (current.stage == NULL || strcmp(current.stage, stage) != 0 || done <= current.done) {
         current.stage = stage;
         current.start = clock_wall();
     }
     current.done = done;
+    const double seconds = clock_wall() - current.start;
     /* A person is told in other words when a stage ends. */
-    if (!log_progress_due() && !(done == total && (listener != NULL || line_is_open)))
+    const bool tells = is_due() || (done == total && (listener != NULL || line_is_open));
+    pthread_mutex_unlock(&lock);
+    if (!tells)
         return;
     char line[LINE_SIZE];
     gbt_event e = {
         .text = line, .stage = stage, .done = done, .total = total, .psnr = psnr, .loss = (double)NAN};
-    e.fraction = total > 0 ? (double)done / (double)total : 0;
-    e.seconds = clock_wall() - current.start;
-    e.seconds_left = done > 0 ? e.seconds * (double)(total - done) / (double)done : (double)NAN;
-    const int used = snprintf(line, sizeof line, "%s: %llu of %llu", stage, (unsigned long long)done,
-                              (unsigned long long)total);
+    e.fraction = total > 0 ? (double)done / (double)total : (double)NAN;
+    e.seconds = seconds;
+    e.seconds_left = done > 0 && total > 0 ? seconds * (double)(total - done) / (double)done : (double)NAN;
+    int used = snprintf(line, sizeof line, "%s: %llu", stage, (unsigned long long)done);
+    if (total > 0)
+        used += snprintf(line + used, sizeof line - (size_t)used, " of %llu", (unsigned long long)total);
     if (isfinite(e.seconds_left))
         snprintf(line + used, sizeof line - (size_t)used, "  %.0f:%02.0f left", floor(e.seconds_left / 60),
                  floor(fmod(e.seconds_left, 60)));

@@ -15,18 +15,20 @@ void log_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void log_info(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /** Whether so much time has passed since the last progress that more is wanted. The first call starts the
-    time. */
+    time. Threads: any. */
 bool log_progress_due(void);
 
 /** Progress, as the caller fills it in; `kind` is set here. Ask log_progress_due() before, but for the end of
-    a stage. */
+    a stage. Threads: any. */
 void log_progress(const gbt_event *event);
 
 /**
  * The same for stages that count: "STAGE: DONE of TOTAL", when due and at the end. `done` from 0 or 1 on: a
  * stage starts when its name is new, or when `done` is not larger than before.
  *
- * @param psnr [in] of what was just done; NaN: none
+ * @param total [in] at least `done`; 0: not known, "STAGE: DONE"
+ * @param psnr  [in] of what was just done; NaN: none
+ * Threads: any; what two of them count at once has no time left that is right.
  */
 void log_count(const char *stage, uint64_t done, uint64_t total, double psnr);
 

@@ -1,40 +1,82 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/stop_signal.c -- one flag, set by a handler. */
+/* base/stop_signal.c -- the time of the first signal, set by a handler. */
 #include "base/stop_signal.h"
 
+#include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stddef.h>
+#include <stdint.h>
+#include <time.h>
 #include <unistd.h>
 
-static atomic_int seen = 0; /* free of locks; the handler may run in another thread than the loop */
-static void (*wake_loop)(void *context) = NULL; /* set before the handler is */
-static void *wake_context = NULL;
+static const int64_t one_second = 1000000000;
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static int loops;                          /* between catch and release */
+static struct sigaction old_int, old_term; /* who handled them before */
+
+/* For the handler, which may run in another thread than the loop: free of locks. */
+static _Atomic int64_t asked_at; /* nanoseconds; 0: no signal so far */
+static void (*_Atomic wake_loop)(void *context) = NULL;
+static void *_Atomic wake_context = NULL;
+
+/* Nothing but the process's end, or what else its host does at this signal, is left to ask for. */
+static void hand_back(int number)
+{
+    struct sigaction old = number == SIGINT ? old_int : old_term;
+    if (old.sa_handler == SIG_IGN) /* as in the background of a script */
+        old.sa_handler = SIG_DFL;
+    sigaction(number, &old, NULL);
+    raise(number);
+    if (old.sa_handler == SIG_DFL) /* the first process of a container outlives it */
+        _exit(128 + number);
+}
 
 static void on_signal(int number)
 {
-    if (seen != 0)
-        _exit(128 + number);
-    seen = number;
-    if (wake_loop != NULL)
-        wake_loop(wake_context);
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    const int64_t now = time.tv_sec * one_second + time.tv_nsec;
+    int64_t first = 0;
+    void (*wake)(void *) = wake_loop;
+    if (!atomic_compare_exchange_strong(&asked_at, &first, now)) {
+        if (now - first > one_second) /* else one request, told twice: by a terminal and by a wrapper */
+            hand_back(number);
+    } else if (wake != NULL) {
+        wake(wake_context);
+    }
 }
 
-void stop_signal_catch(stop_signal_guard *guard, void (*wake)(void *context), void *context)
+void stop_signal_catch(void)
 {
-    struct sigaction action = {.sa_handler = on_signal};
+    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_NODEFER}; /* for hand_back() */
     sigemptyset(&action.sa_mask);
-    seen = 0;
-    wake_loop = wake;
-    wake_context = context;
-    sigaction(SIGINT, &action, &guard->old_int);
-    sigaction(SIGTERM, &action, &guard->old_term);
+    pthread_mutex_lock(&lock);
+    if (loops++ == 0) {
+        asked_at = 0;
+        sigaction(SIGINT, &action, &old_int);
+        sigaction(SIGTERM, &action, &old_term);
+    }
+    pthread_mutex_unlock(&lock);
 }
 
-void stop_signal_release(const stop_signal_guard *guard)
+void stop_signal_release(void)
 {
-    sigaction(SIGINT, &guard->old_int, NULL);
-    sigaction(SIGTERM, &guard->old_term, NULL);
-    seen = 0;
+    pthread_mutex_lock(&lock);
+    if (--loops == 0) {
+        sigaction(SIGINT, &old_int, NULL);
+        sigaction(SIGTERM, &old_term, NULL);
+        asked_at = 0;
+    }
+    pthread_mutex_unlock(&lock);
 }
 
-bool stop_signal_seen(void) { return seen != 0; }
+void stop_signal_wake(void (*wake)(void *context), void *context)
+{
+    if (wake != NULL)
+        wake_context = context;
+    wake_loop = wake;
+}
+
+bool stop_signal_seen(void) { return asked_at != 0; }

@@ -1,25 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/stop_signal.h -- SIGINT and SIGTERM while a loop runs: the first one asks it to stop, a second one
-   ends the process. */
+/* base/stop_signal.h -- SIGINT and SIGTERM while loops run: the first one asks all of them to stop, as do
+   others within a second of it; a later one goes to who handled it before, which mostly ends the process. */
 #ifndef GBT_BASE_STOP_SIGNAL_H
 #define GBT_BASE_STOP_SIGNAL_H
 
-#include <signal.h>
 #include <stdbool.h>
 
-typedef struct stop_signal_guard {
-    struct sigaction old_int, old_term;
-} stop_signal_guard;
+/** Catch both signals until as many stop_signal_release(). Threads: any, also at once. */
+void stop_signal_catch(void);
+
+/** The last one forgets the signal; who handled them before does again. */
+void stop_signal_release(void);
+
+/** Whether to stop; between stop_signal_catch() and stop_signal_release(). Threads: any. */
+bool stop_signal_seen(void);
 
 /**
- * Catch both signals until stop_signal_release(), one loop of the process at a time.
+ * What else the first signal does, for one loop of the process.
  *
- * @param wake [in] optional (NULL): called with `context` in the handler at the first signal, in any thread;
- *                  async-signal-safe
+ * @param wake [in] called with `context` in the handler, in any thread; async-signal-safe. NULL: nothing
  */
-void stop_signal_catch(stop_signal_guard *guard, void (*wake)(void *context), void *context);
-void stop_signal_release(const stop_signal_guard *guard); /* who handled them before does again */
-
-bool stop_signal_seen(void); /* between stop_signal_catch() and stop_signal_release(); any thread */
+void stop_signal_wake(void (*wake)(void *context), void *context);
 
 #endif

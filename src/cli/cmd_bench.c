@@ -122,7 +122,6 @@ static const option *options_bench(int *count)
          .value = &query_folder,
          .value_name = "DIR",
          .help = "write query.csv, query.json and query.svg there"},
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;
@@ -149,15 +148,6 @@ const command command_bench = {.name = "bench",
                                .run = run_bench,
                                .words = workloads};
 
-static const option *options_check_grad(int *count)
-{
-    static const option rows[] = {
-        THREADS_OPTION,
-    };
-    *count = sizeof rows / sizeof *rows;
-    return rows;
-}
-
 static int run_check_grad(const operands *given)
 {
     gbt_error err = {0};
@@ -168,7 +158,6 @@ const command command_check_grad = {
     .name = "check-grad",
     .summary = "check the gradients of a trained run against double precision and finite differences",
     .usage = "RUN",
-    .options = options_check_grad,
     .min_operands = 1,
     .max_operands = 1,
     .run = run_check_grad};

@@ -32,7 +32,6 @@ static const option *options(int *count)
         DATA_OPTION(&def.data, "use the cameras of this data set instead of the one it was trained on"),
         JSON_OPTION(&def.json, "write the figures to this file"),
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

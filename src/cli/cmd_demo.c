@@ -52,7 +52,6 @@ static const option *options(int *count)
          .value = &train.seed,
          .value_name = "S",
          .help = "random seed"},
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

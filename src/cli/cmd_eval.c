@@ -26,7 +26,6 @@ static const option *options(int *count)
          .value_name = "FILE",
          .help = LPIPS_HELP},
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

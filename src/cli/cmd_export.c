@@ -54,7 +54,6 @@ static const option *options(int *count)
          .value_name = "FILE",
          .help = "result folder: " LPIPS_HELP},
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

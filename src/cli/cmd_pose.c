@@ -37,7 +37,6 @@ static const option *options(int *count)
          .value = &def.matcher,
          .choices = GBT_POSE_MATCHER_NAMES,
          .help = "which pairs are matched; auto: all, of many those near in time or by GPS"},
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

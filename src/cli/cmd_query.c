@@ -52,7 +52,6 @@ static const option *options(int *count)
          .value_name = "R",
          .help = "of the ball"},
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -147,7 +147,6 @@ static const option *options(int *count)
          .choices = GBT_PICTURE_FORMAT_NAMES,
          .help = "8-bit PNG, or float EXR"},
         DOWNSCALE_OPTION(&def.downscale),
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

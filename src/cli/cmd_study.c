@@ -179,7 +179,6 @@ static const option *options(int *count)
          .value_name = "N",
          .help = "runs of each variant; 0: 3, 1 and 3"},
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

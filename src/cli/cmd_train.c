@@ -37,7 +37,6 @@ static const option own_rows[] = {
      .value_name = "T1,T2",
      .help = "measure held-out PSNR after these training times, such as 1m,2m; not counted as training time",
      .rare = true},
-    THREADS_OPTION,
 };
 
 static const option *options(int *count)
@@ -55,6 +54,10 @@ static int run(const operands *given)
     if (given->count == 0 && !def.resume)
         return command_misused("argument missing (usage: gbtrace %s %s)", command_train.name,
                                command_train.usage);
+    if (def.resume && !options_typed(&def.iterations)) /* a file or variable speaks of all runs */
+        def.iterations = 0;
+    if (def.resume && !options_typed(&def.budget_seconds))
+        def.budget_seconds = 0;
     gbt_error err = {0};
     gbt_status status = train_options_finish(&def, eval_at, given, &err);
     if (status == GBT_OK)

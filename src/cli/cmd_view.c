@@ -38,7 +38,6 @@ static const option *options(int *count)
                  "only with the token printed"},
         DATA_OPTION(&def.data, "photos of another data set"),
         MEMORY_OPTION,
-        THREADS_OPTION,
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -36,6 +36,13 @@ static bool help_wanted;
 void options_table(const command *self, option_table *t)
 {
     const option common[OPTIONS_COMMON] = {
+        {.name = "threads",
+         .kind = OPTION_INT,
+         .value = &options_threads,
+         .min = 0,
+         .max = 1024,
+         .value_name = "T",
+         .help = "threads; 0: all processors, within the container's limit"},
         {.name = "progress",
          .kind = OPTION_CHOICE,
          .value = &wanted_progress,
@@ -73,7 +80,7 @@ void options_table(const command *self, option_table *t)
     if (own > 0)
         memcpy(t->rows, rows, (size_t)own * sizeof *rows);
     memcpy(t->rows + own, common, sizeof common);
-    t->own = own;
+    t->own = own + 1;
     t->count = own + OPTIONS_COMMON;
     for (int i = 0; i < own; i++)
         if (t->rows[i].kind == OPTION_OPERAND)
@@ -259,8 +266,9 @@ static int check_complete(const command *self, const option_table *t, const bool
 
 /* ---- entry ---- */
 
-/** The table of the command that runs. */
+/** The table of the command that runs, and which of its rows were on the command line. */
 static option_table current;
+static bool typed[TABLE_MAX];
 
 static const char *help_option(int argc, char **argv)
 {
@@ -275,7 +283,8 @@ int options_parse(const command *self, int argc, char **argv, operands *out)
 {
     option_table *t = &current;
     options_set_fields(t);
-    bool given[TABLE_MAX] = {false}, before[TABLE_MAX] = {false};
+    bool before[TABLE_MAX] = {false};
+    memset(typed, 0, sizeof typed);
     *out = (operands){.argc = argc, .argv = argv};
     options_table(self, t);
     const char *help = help_option(argc, argv);
@@ -283,9 +292,9 @@ int options_parse(const command *self, int argc, char **argv, operands *out)
         options_print_help(self, t, strcmp(help, "--help-all") == 0);
         return 0;
     }
-    int code = options_read_environment(self, t->rows + t->own, OPTIONS_COMMON, before + t->own);
+    int code = options_read_environment(self, t->rows + t->own, t->count - t->own, before + t->own);
     if (code == GO_ON)
-        code = walk(t, true, argc, argv, given, out);
+        code = walk(t, true, argc, argv, typed, out);
     if (code == GO_ON)
         progress_start((progress_mode)wanted_progress, self->name);
     if (code == GO_ON && config_path != NULL)
@@ -294,9 +303,9 @@ int options_parse(const command *self, int argc, char **argv, operands *out)
     first_operand = NULL;
     if (code == GO_ON)
         code = options_read_environment(self, t->rows, t->own, before);
-    memset(given, 0, sizeof given);
+    memset(typed, 0, sizeof typed);
     if (code == GO_ON)
-        code = walk(t, false, argc, argv, given, out);
+        code = walk(t, false, argc, argv, typed, out);
     if (code != GO_ON)
         return code;
     if (first_operand != NULL)
@@ -304,7 +313,15 @@ int options_parse(const command *self, int argc, char **argv, operands *out)
     else if (configured_operand != NULL && out->count < (self->min_operands > 0 ? self->min_operands : 1))
         put_first(out, configured_operand);
     for (int i = 0; i < t->count; i++)
-        before[i] = before[i] || given[i];
+        before[i] = before[i] || typed[i];
     code = check_complete(self, t, before, out);
-    return code == GO_ON ? check_belongs(self, t, given, out) : code;
+    return code == GO_ON ? check_belongs(self, t, typed, out) : code;
+}
+
+bool options_typed(const void *place)
+{
+    for (int i = 0; i < current.count; i++)
+        if (typed[i] && current.rows[i].value == place)
+            return true;
+    return false;
 }

@@ -51,13 +51,7 @@ typedef struct option {
 
 #define LPIPS_HELP "network weights (.safetensors), to compute LPIPS too (docs/metrics.md)"
 
-/** The row of a command that can use several threads; the program gives their number to the library. */
-#define THREADS_OPTION                                                                                       \
-    {                                                                                                        \
-        .name = "threads", .kind = OPTION_INT, .value = &options_threads, .min = 0, .max = 1024,             \
-        .value_name = "T", .help = "threads; 0: all processors, within the container's limit"                \
-    }
-extern int options_threads;
+extern int options_threads; /* of --threads, which every command has; it is given to the library */
 
 /** The row of a command whose data may be larger than memory; it is kept for it as for gbt_set_memory(). */
 #define MEMORY_OPTION                                                                                        \
@@ -104,7 +98,7 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err);
 enum {
     OPTIONS_MAX = 80,
     OPTIONS_MAX_OPERANDS = 64,
-    OPTIONS_COMMON = 5,
+    OPTIONS_COMMON = 6,
     OPTIONS_WANTED_SIZE = 256,
     HELP_TEXT_SIZE = 1024
 };
@@ -119,7 +113,7 @@ typedef struct operands {
 /** The rows of a command, the common ones last. */
 typedef struct option_table {
     option rows[OPTIONS_MAX + OPTIONS_COMMON];
-    int own, count; /* own ones; all */
+    int own, count; /* own ones and --threads, which configuration files may set; all */
 } option_table;
 
 void options_table(const command *self, option_table *out);
@@ -127,16 +121,20 @@ void options_table(const command *self, option_table *out);
 /**
  * Parse the arguments of a subcommand into the places that its table names.
  *
- * Takes `--name VALUE`, `--name=VALUE`, `-x VALUE`; `--` ends the options. Five options belong to every
- * command: `--help` and `--help-all` print the help to stdout, `--progress` and `--quiet` say how to tell
- * what is going on, `--config FILE` reads `name = value` lines (lines with # at their start are comments;
- * flags are true or false). The environment wins over the file (GBTRACE_NAME, and over that
- * GBTRACE_COMMAND_NAME), the command line over both. Strings stay valid until the program ends.
+ * Takes `--name VALUE`, `--name=VALUE`, `-x VALUE`; `--` ends the options. Six options belong to every
+ * command: `--help` and `--help-all` print the help to stdout, `--threads` says how many, `--progress` and
+ * `--quiet` say how to tell what is going on, `--config FILE` reads `name = value` lines (lines with # at
+ * their start are comments; flags are true or false). The environment wins over the file (GBTRACE_NAME, and
+ * over that GBTRACE_COMMAND_NAME), the command line over both. Strings stay valid until the program ends.
  *
  * @return -1: go on; else the exit code to end with: 0 after --help, 2 for a bad command line or environment
  *         (3 and 4 for a bad --config file), after one line on stderr
  */
 int options_parse(const command *self, int argc, char **argv, operands *out);
+
+/** Whether the option of this place was on the command line that was parsed last, not only in a file or the
+    environment. */
+bool options_typed(const void *place);
 
 /**
  * What the library says of a field, "init_count: ...", as what the user typed: "--init-count: ...". Every

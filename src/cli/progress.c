@@ -4,7 +4,9 @@
 
 #include <stdarg.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "gbtrace/progress.h"
 #include "gbtrace/status.h"
@@ -88,8 +90,10 @@ bool progress_for_people(void) { return !as_json && !silent; }
 void progress_error(const char *text)
 {
     snprintf(last_error, sizeof last_error, "%s", text);
+    const char *kind = getenv("TERM");
+    const bool over = isatty(STDERR_FILENO) && kind != NULL && strcmp(kind, "dumb") != 0;
     if (!as_json)
-        fprintf(stderr, "error: %s\n", text);
+        fprintf(stderr, "%serror: %s\n", over ? "\r\033[K" : "", text); /* progress may stand there */
 }
 
 const char *progress_last_error(void) { return last_error[0] != '\0' ? last_error : NULL; }

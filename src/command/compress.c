@@ -261,10 +261,9 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err)
 {
-    stop_signal_guard guard;
-    stop_signal_catch(&guard, NULL, NULL);
+    stop_signal_catch();
     const gbt_status status =
         cluster_follow(cluster_leads() ? compress(run, def, out, report, err) : GBT_OK, err);
-    stop_signal_release(&guard);
+    stop_signal_release();
     return status;
 }

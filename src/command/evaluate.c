@@ -93,8 +93,7 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     GBT_TRY(def_check(def->cookie_, "gbt_evaluate_def_default", err));
     if (!file_is_folder(run))
         return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);
-    stop_signal_guard guard;
-    stop_signal_catch(&guard, NULL, NULL);
+    stop_signal_catch();
     evaluation e = {0};
     lpips *net = NULL;
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
@@ -136,6 +135,6 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     if (r != NULL)
         loaded_run_close(r);
     mem_free(r);
-    stop_signal_release(&guard);
+    stop_signal_release();
     return status;
 }

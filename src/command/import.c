@@ -9,12 +9,15 @@
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "data/result_folder.h"
+#include "data/scene.h"
 #include "frame/frame.h"
 #include "gbtrace/train.h"
 #include "io/scaffold_file.h"
 #include "train/config.h"
+#include "train/photos.h"
 #include "train/rules.h"
 
 gbt_import_def gbt_import_def_default(void)
@@ -43,6 +46,25 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
                : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
 }
 
+/* A width in cfg_args divides photos by what only they can say. */
+static gbt_status find_downscale(const result_folder *from, const char *data, double *out, gbt_error *err)
+{
+    scene s;
+    gbt_error why = {0};
+    *out = from->downscale;
+    if (from->width == 0)
+        return GBT_OK;
+    if (scene_load(data, NULL, &s, &why) != GBT_OK) {
+        log_warn(
+            "trained on photos %d pixels wide, and the data set cannot be read: tell eval the downscale (%s)",
+            from->width, why.text);
+        return GBT_OK;
+    }
+    const gbt_status status = photos_downscale_to(&s, from->width, out, err);
+    scene_free(&s);
+    return status;
+}
+
 /* What is about the scene and the run. */
 static gbt_status describe(model *m, const result_folder *from, const gbt_import_def *def, gbt_error *err)
 {
@@ -55,7 +77,7 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     gbt_train_def train = gbt_train_def_default();
     train.renderer = def->renderer;
     train.footprint = 0;
-    train.downscale = from->downscale;
+    GBT_TRY(find_downscale(from, m->data_folder, &train.downscale, err));
     train.compat = true;
     train.offsets = m->anchors.offset_count;
     train.alpha = from->white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;

@@ -174,8 +174,11 @@ static gbt_status measure(measuring *m, const char *log_path, double *seconds, g
     for (;;) {
         bool more;
         GBT_TRY(take_picture(m, &more, err));
-        if (!more)
+        if (!more) {
+            if (*seconds == 0 && rate > 0)
+                *seconds = (double)m->count / rate;
             return GBT_OK;
+        }
         if (m->count == 0)
             read_length(log_path, seconds, &rate);
         void *grown = m->frames;
@@ -187,7 +190,7 @@ static gbt_status measure(measuring *m, const char *log_path, double *seconds, g
                                               .change = change_of(m)};
         m->count++;
         const double total = *seconds * rate;
-        log_count("frames, measuring", m->count, total > (double)m->count ? (uint64_t)total : m->count,
+        log_count("frames, measuring", m->count, total >= (double)m->count ? (uint64_t)total : 0,
                   (double)NAN);
     }
 }

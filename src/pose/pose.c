@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/choice.h"
@@ -94,30 +95,58 @@ static void put_setting(sink *out, const char *name, const char *value)
     sink_put_text(out, "\n");
 }
 
-static gbt_status settings_text(const job *j, sink *out)
+/* Its size in bytes, and when it was written in seconds, tell it from another file of that name. */
+static gbt_status put_file(sink *out, const char *setting, const char *name, const char *path)
 {
-    char frames[16];
+    struct stat info;
+    char value[JOB_PATH_SIZE + 64];
+    if (stat(path, &info) != 0)
+        return base_fail(out->err, GBT_ERR_IO, "%s: %s", path, strerror(errno));
+    snprintf(value, sizeof value, "%s %lld %lld", name, (long long)info.st_size, (long long)info.st_mtime);
+    put_setting(out, setting, value);
+    return out->status;
+}
+
+/** @param files [in] with what put_file() says of the film and of photos, not their names alone */
+static gbt_status settings_text(const job *j, bool files, sink *out)
+{
+    char frames[16], path[JOB_PATH_SIZE];
     snprintf(frames, sizeof frames, "%d", j->def.frames);
-    put_setting(out, "source", j->source);
+    if (j->is_film && files)
+        GBT_TRY(put_file(out, "source", j->source, j->source));
+    else
+        put_setting(out, "source", j->source);
     put_setting(out, "camera_model", CHOICE_NAME(GBT_POSE_CAMERA_NAMES, j->def.camera_model));
     put_setting(out, "matcher", CHOICE_NAME(GBT_POSE_MATCHER_NAMES, j->def.matcher));
     if (j->is_film)
         put_setting(out, "frames", frames);
-    else
-        for (size_t i = 0; i < j->photo_count; i++)
+    for (size_t i = 0; i < j->photo_count && !j->is_film; i++) {
+        GBT_TRY(file_join(path, sizeof path, j->source, j->photos[i].name, out->err));
+        if (files)
+            GBT_TRY(put_file(out, "photo", j->photos[i].name, path));
+        else
             put_setting(out, "photo", j->photos[i].name);
+    }
     return out->status;
+}
+
+static bool is_same(const sink *text, const unsigned char *bytes, size_t size)
+{
+    return size == text->size && memcmp(bytes, text->bytes, size) == 0;
 }
 
 static gbt_status compare_settings(const job *j, const char *path, const sink *now, gbt_error *err)
 {
     unsigned char *then;
     size_t size;
+    sink names = {.err = err}; /* older folders say no more */
     GBT_TRY(file_read(path, &then, &size, err));
-    const bool same = size == now->size && memcmp(then, now->bytes, size) == 0;
+    const gbt_status status = settings_text(j, false, &names);
+    const bool same = status == GBT_OK && (is_same(now, then, size) || is_same(&names, then, size));
+    sink_free(&names);
     mem_free(then);
-    return same
-               ? GBT_OK
+    return same || status != GBT_OK
+               ? status
                : base_fail(err, GBT_ERR_ARGUMENT,
                            "%s: was begun with other photos or options, which %s lists (go on with those, or "
                            "name another folder)",
@@ -148,7 +177,7 @@ static gbt_status begin(const job *j, gbt_error *err)
     char path[JOB_PATH_SIZE];
     GBT_TRY(job_path(j, "settings", path, err));
     sink now = {.err = err};
-    gbt_status status = settings_text(j, &now);
+    gbt_status status = settings_text(j, true, &now);
     if (status == GBT_OK && file_exists(path))
         status = compare_settings(j, path, &now, err);
     else if (status == GBT_OK)
@@ -221,10 +250,9 @@ gbt_status gbt_pose(const char *source, const gbt_pose_def *def, const char *dat
     if (status == GBT_OK)
         status = lock(j, &locked, err);
     if (status == GBT_OK) {
-        stop_signal_guard guard;
-        stop_signal_catch(&guard, NULL, NULL);
+        stop_signal_catch();
         status = run(j, report, err);
-        stop_signal_release(&guard);
+        stop_signal_release();
     }
     if (locked >= 0)
         close(locked);

@@ -295,11 +295,10 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
 {
     trainer *t = mem_calloc(1, sizeof *t, "trainer", err);
     config_strings *strings = mem_calloc(1, sizeof *strings, "settings", err);
-    stop_signal_guard guard;
-    stop_signal_catch(&guard, NULL, NULL);
+    stop_signal_catch();
     gbt_status status =
         t == NULL || strings == NULL ? GBT_ERR_NO_MEMORY : run_with_folder(t, data, run, def, strings, err);
-    stop_signal_release(&guard);
+    stop_signal_release();
     if (t != NULL)
         trainer_free(t);
     mem_free(t);

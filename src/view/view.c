@@ -37,12 +37,13 @@ static void serve(studio *s, server *http)
 
 static void serve_until_signal(studio *s, server *http, const char *url, const gbt_view_def *def)
 {
-    stop_signal_guard signals;
-    stop_signal_catch(&signals, wake, http);
+    stop_signal_wake(wake, http);
+    stop_signal_catch();
     if (def->ready != NULL)
         def->ready(url, def->context);
     serve(s, http);
-    stop_signal_release(&signals);
+    stop_signal_release();
+    stop_signal_wake(NULL, NULL);
 }
 
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)

@@ -7,6 +7,7 @@
 #include <stdatomic.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "base/cpu.h"
@@ -20,6 +21,7 @@
 #include "base/parallel.h"
 #include "base/stage.h"
 #include "base/rng.h"
+#include "base/stop_signal.h"
 #include "base/vec.h"
 #include "gbtrace/progress.h"
 #include "test_support.h"
@@ -39,6 +41,43 @@ static void a_rotation_has_nine_numbers(void **state)
     }
     const double mirror[9] = {1, 0, 0, 0, 1, 0, 0, 0, -1};
     assert_false(dmat_is_rotation(mirror, 1e-3));
+}
+
+static void signals_have_their_handlers_back(void **state)
+{
+    (void)state;
+    struct sigaction before[2], after[2];
+    sigaction(SIGINT, NULL, &before[0]);
+    sigaction(SIGTERM, NULL, &before[1]);
+    stop_signal_catch();
+    stop_signal_catch();
+    raise(SIGINT);
+    raise(SIGTERM); /* at once: it is the same request */
+    stop_signal_release();
+    assert_true(stop_signal_seen());
+    stop_signal_release();
+    assert_false(stop_signal_seen());
+    sigaction(SIGINT, NULL, &after[0]);
+    sigaction(SIGTERM, NULL, &after[1]);
+    assert_true(after[0].sa_handler == before[0].sa_handler && after[1].sa_handler == before[1].sa_handler);
+}
+
+static void a_later_signal_ends_the_process(void **state)
+{
+    (void)state;
+    const pid_t process = fork();
+    assert_true(process >= 0);
+    if (process == 0) {
+        signal(SIGINT, SIG_IGN); /* as a shell leaves it to what it starts in the background */
+        stop_signal_catch();
+        raise(SIGINT);
+        usleep(1100000);
+        raise(SIGINT);
+        _exit(0);
+    }
+    int ended = 0;
+    assert_int_equal(waitpid(process, &ended, 0), process);
+    assert_true(WIFSIGNALED(ended) && WTERMSIG(ended) == SIGINT);
 }
 
 static void first_cause_wins(void **state)
@@ -713,6 +752,8 @@ static void a_shell_takes_a_text_for_one_word(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(signals_have_their_handlers_back),
+        cmocka_unit_test(a_later_signal_ends_the_process),
         cmocka_unit_test(a_shell_takes_a_text_for_one_word),
         cmocka_unit_test(a_rotation_has_nine_numbers),
         cmocka_unit_test(first_cause_wins),

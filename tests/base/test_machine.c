@@ -153,7 +153,7 @@ static void hear(const gbt_event *e, void *context)
         h->total = e->total;
         h->fraction = e->fraction;
         assert_true(isnan(e->loss) && e->psnr == 30 && e->seconds >= 0 &&
-                    (e->seconds_left >= 0 || e->done == 0));
+                    (e->seconds_left >= 0 || e->done == 0 || (e->total == 0 && isnan(e->seconds_left))));
     }
 }
 
@@ -171,6 +171,9 @@ static void tells_a_listener(void **state)
     assert_true(h.count[GBT_EVENT_PROGRESS] >= 1 &&
                 h.count[GBT_EVENT_PROGRESS] < 1000); /* the end for certain, the rest by the clock */
     assert_true(h.done == 1000 && h.total == 1000 && h.fraction == 1 && strcmp(h.stage, "stage") == 0);
+    usleep(600000); /* progress is due again */
+    log_count("endless", 7, 0, 30);
+    assert_true(h.total == 0 && isnan(h.fraction) && strcmp(h.text, "endless: 7") == 0);
     gbt_listen(NULL, NULL);
 }
 

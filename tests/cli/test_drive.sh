@@ -76,6 +76,10 @@ TERM=dumb on_terminal "$@" && grep -q 'step 3 ' seen && ! grep -q "$over" seen &
 report $? "no such terminal" "$(cat seen)"
 TERM=xterm "$@" >seen 2>&1 && grep -q 'step 3 ' seen && ! grep -q "$over" seen
 report $? "no terminal" "$(cat seen)"
+over=$(printf '\r\033.Kerror: nothing: ')
+TERM=xterm on_terminal "$program" eval nothing
+grep -q "$over" seen && { TERM=dumb on_terminal "$program" eval nothing; grep -q 'error: nothing: ' seen; } && ! grep -q "$over" seen
+report $? "an error is written over progress" "$(cat seen)"
 
 # ---- TensorBoard, read by itself
 python=python3
@@ -175,19 +179,27 @@ for file in opacity_mlp.pt checkpoints.pth; do
     (cd scaffold && PYTHONPATH=../stubs sh ../command) >out 2>&1 && "$program" import scaffold -o imported >>out 2>&1 && grep -q '^scaffold/point_cloud.ply: 3 anchors with 2 Gaussians each' out
     report $? "and the command for $file does" "$(cat command out)"
 done
+mkdir -p widths/point_cloud/iteration_7 && cp scaffold/point_cloud.ply scaffold/*.safetensors widths/point_cloud/iteration_7
+printf "Namespace(source_path='made', resolution=16)" >widths/cfg_args
+"$program" import widths -o at_width >out 2>err && [ ! -s err ] && "$program" info at_width | grep -q '^  config    downscale = 2$'
+report $? "a width in cfg_args divides the photos of the data set" "$(cat err out; "$program" info at_width)"
+printf "Namespace(source_path='gone', resolution=16)" >widths/cfg_args
+"$program" import widths -o at_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
+report $? "without the data set it is told" "$(cat err out)"
 
 # ---- the doctor
 "$program" doctor >out 2>err
 code=$?
 [ $code -le 1 ] && [ ! -s err ] && [ "$(grep -c -e '^ok ' -e '^warn ' -e '^fail ' out)" = 11 ] && [ "$(grep -c '^ok   \(tracer\|gradients\|speed\|locale\|folder\|libraries\) ' out)" = 6 ]
 report $? "the doctor" "$(cat err out)"
-GBTRACE_THREDS=1 GBTRACE_THREADS=2 GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
+GBTRACE_THREDS=1 GBTRACE_THREADS=$(($(nproc --all) + 1)) GBT_ISA=plain "$program" doctor nowhere --json >out 2>err
 [ $? = 1 ] && python3 -c 'import json, sys
 d = json.load(open("out"))
 c = {x["name"]: x for x in d["checks"]}
 assert d["schema"] == 1 and d["failed"] == sum(x["level"] == "fail" for x in d["checks"]) >= 1
 assert c["folder"]["level"] == "fail" and c["folder"]["found"] == "nowhere: no such folder" and c["folder"]["advice"]
 assert c["environment"]["level"] == "warn" and "GBTRACE_THREDS" in c["environment"]["advice"] and c["environment"]["found"].startswith("1 variables set options, 1 ")
+assert c["threads"]["level"] == "warn" and "GBTRACE_THREADS=" in c["threads"]["advice"]
 assert c["processor"]["level"] == "warn" and "GBT_ISA=plain" in c["processor"]["advice"] and c["tracer"]["level"] == c["gradients"]["level"] == "ok"' 2>>err
 report $? "the doctor finds what is wrong" "$(cat err out)"
 finish

@@ -254,7 +254,8 @@ static void order_of_config_and_command_line(void **state)
     const int fd = mkstemp(path);
     assert_true(fd >= 0);
     FILE *file = fdopen(fd, "w");
-    fputs("depth = 3\nname=from file # not a comment\ngrow = false\nno-prune = true\n", file);
+    fputs("depth = 3\nname=from file # not a comment\ngrow = false\nno-prune = true\nthreads = 3\n", file);
+    unsetenv("GBTRACE_THREADS");
     fclose(file);
     const command self = {.name = "test", .summary = "", .usage = "", .options = ordered, .max_operands = 3};
     operands found;
@@ -265,6 +266,9 @@ static void order_of_config_and_command_line(void **state)
     assert_false(grow);
     assert_false(prune);
     assert_string_equal(name, "from file # not a comment");
+    assert_int_equal(options_threads, 3); /* of every command */
+    assert_true(options_typed(&depth));
+    assert_false(options_typed(&grow));
     assert_int_equal(found.count, 3);
     assert_string_equal(found.value[0], "first");
     assert_string_equal(found.value[1], "-");

@@ -204,8 +204,8 @@ outside() {
     wait $pid
     code=$?
     cp long said
-    [ $code = 130 ] || [ $code = 143 ] || bad "SIGINT, then SIGTERM" "exit code $code"
-    [ ! -e case/run/checkpoints/last.gbt ] || bad "SIGINT, then SIGTERM" "it saved before it ended"
+    [ $code = 130 ] || bad "SIGINT and SIGTERM at once" "exit code $code"
+    [ -e case/run/checkpoints/last.gbt ] || bad "SIGINT and SIGTERM at once" "it did not save"
 
     prepare
     long_run

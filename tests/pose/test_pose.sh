@@ -82,6 +82,12 @@ says "once more it only reports" 0 "^fails: 5 of 5 photos registered" pose "my p
 [ ! -s tools/calls ] && "$program" info fails >out 2>&1 && grep -q '30 found\|5 found' out
 report $? "without COLMAP, and info reads it" "$(cat tools/calls out)"
 says "other options in the same folder" 2 "^error: fails: was begun with other photos or options" pose "my photos" -o fails --matcher sequential
+mkdir swapped && cp "my photos"/*.png swapped/
+says "photos of a folder" 0 "^replaced: 5 of 5 photos registered" pose swapped -o replaced
+cp swapped/0001.png swapped/0002.png
+says "another photo of the same name" 2 "^error: replaced: was begun with other photos or options" pose swapped -o replaced
+sed -i 's/^\(photo = .*\) [0-9]* [0-9]*$/\1/' replaced/colmap/settings
+says "a folder that says names alone" 0 "^replaced: 5 of 5 photos registered" pose swapped -o replaced
 export FALSE_COLMAP=few
 says "some photos are not registered" 0 "^few: 3 of 5 photos registered" pose "my photos" -o few
 grep -q '^  without   0003.png: few matches: 77 with 1 registered photos' out && grep -q '^  without   0004.png: matches no other photo (500 features)' out
@@ -161,6 +167,19 @@ printf '#!/bin/sh\necho "P5 what is this"\n' >tools/ffmpeg
 says "ffmpeg gives something else" 4 "^error: ffmpeg: its output is not as wanted" pose film.mp4 -o film
 [ ! -e film/images ]
 report $? "no frames are left" "$(ls -R film)"
+cat >tools/ffmpeg <<'END'
+#!/usr/bin/env python3
+import sys
+if "-progress" in sys.argv:
+    sys.exit("no room for frames")
+sys.stderr.write("  Duration: N/A, bitrate: N/A\n  Stream #0:0: Video: mjpeg, gray, 64x48, 2 fps, 2 tbr\n")
+sys.stderr.flush()
+for i in range(100):
+    sys.stdout.buffer.write(b"P5\n64 48\n255\n" + bytes((i + k) % 256 for k in range(64 * 48)))
+END
+PATH=$tools "$program" pose film.mp4 -o lasting --progress json >out 2>err
+[ $? = 4 ] && grep -q ': 100 of 100 frames chosen, ' err && [ "$(grep -c '"stage": "frames, measuring"' err)" -lt 50 ]
+report $? "a film that does not say how long it is: three a second all the same" "$(cat err)"
 rm tools/ffmpeg
 if command -v ffmpeg >/dev/null; then
     ffmpeg -hide_banner -loglevel error -y -f lavfi -i testsrc=size=320x240:rate=25:duration=4 "a film.mp4" </dev/null

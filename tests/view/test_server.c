@@ -3,6 +3,8 @@
    limits, the end. */
 #include "view/http_client.h"
 
+#include <signal.h>
+
 #include "base/file.h"
 #include "base/stop_signal.h"
 #include "view/server.h"
@@ -378,15 +380,14 @@ static void it_is_known_that_nobody_waits(void **state)
 static void a_signal_ends_what_is_made(void **state)
 {
     (void)state;
-    stop_signal_guard signals;
-    stop_signal_catch(&signals, NULL, NULL);
+    stop_signal_catch();
     const int fd = http_ask(port, "/render?view=0");
     server_job *job = wait_for_job(s);
     assert_false(atomic_load(server_nobody_waits(s)));
     raise(SIGINT);
     while (!atomic_load(server_nobody_waits(s)))
         usleep(10000);
-    stop_signal_release(&signals); /* forgets it */
+    stop_signal_release(); /* forgets it */
     answer_with(s, job, "given up");
     expect(fd, 200, "given up");
 }

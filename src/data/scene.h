@@ -106,6 +106,10 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 /** scene_load() with the origin 0: coordinates are the world's, rounded to float where they are points. */
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
 
+/** Forget the sparse points, and what they say of photos; `recentres`: the origin becomes that of a scene
+    without points. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status scene_forget_points(scene *s, bool recentres, gbt_error *err);
+
 void scene_free(scene *s);
 static inline void scene_view_free(scene_view *view)
 {

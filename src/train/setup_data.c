@@ -180,8 +180,7 @@ static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
 
 /* What is held out is read after the last step, to score it: what could not be read then is told now. The
    headers of all photos have been seen, which tell of files that are cut and of other shapes; damaged pixels
-   are looked for in no more photos than are trained on, so that a run takes at most twice as long to start.
- */
+   are looked for in no more photos than are trained on, so that it takes no longer than to read those. */
 static gbt_status try_held_out(trainer *t, gbt_error *err)
 {
     const size_t most = t->test_count < t->train_count ? t->test_count : t->train_count;
@@ -231,6 +230,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     GBT_TRY(choose_downscale(t, err));
     GBT_TRY(check_memory(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
+    t->photos.decoded_max = def->memory / 4;
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));

@@ -38,9 +38,9 @@ typedef struct gbt_train_def {
     double footprint; /* rays are as wide as pixels: variance of a pixel, px^2; 0: thin rays. 0 with compat,
                          splats are dilated then */
     double near; /* nothing is seen nearer to a camera than this part of the depth at which its photo's first
-                    sparse points are: of all training photos the least but for one in twenty, which have a
-                    distance of their own; nor than 2 % of the median distance of anchors, which is what
-                    counts where points have no tracks. 0 with compat */
+                    sparse points are: of all training photos the least but for one in twenty, and at least
+                    2 % of the median distance of anchors, which is what counts where points have no tracks.
+                    A photo whose points are nearer than that has its own. 0 with compat */
     int start_level; /* first steps look at 1 pixel in 4^start_level, at random places; all come last. 0 with
                         compat */
     const char *eval_split; /* held-out photos: "auto" (as the data set says, else every=8), "every=N",
@@ -178,7 +178,7 @@ void gbt_set_threads(int threads);
  * Memory that the process shall take for everything that follows, bytes; 0: no limit. Large arrays are then
  * in files without a name in `folder` (docs/memory.md), which must be on a disk. Results do not depend on it.
  * What cannot be let go of may still take more. gbt_train() with gbt_train_def.memory does this for its own
- * time.
+ * time; a limit set before ends with it.
  *
  * @return GBT_OK, or GBT_ERR_IO when no file can be made there
  */

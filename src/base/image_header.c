@@ -68,9 +68,10 @@ static gbt_status set_size(const reader *r, int64_t width, int64_t height, int64
 {
     if (width < 1 || height < 1 || width > IMAGE_SAMPLES_MAX || height > IMAGE_SAMPLES_MAX ||
         width * height > IMAGE_SAMPLES_MAX || width * height * channels > IMAGE_SAMPLES_MAX)
-        return base_fail(r->err, GBT_ERR_FORMAT,
-                         "%s: image of %lld x %lld pixels and %lld channels (wanted 1 x 1 to 2^28 samples)",
-                         r->path, (long long)width, (long long)height, (long long)channels);
+        return base_fail(
+            r->err, GBT_ERR_FORMAT,
+            "%s: image of %lld x %lld pixels and %lld channels (wanted 1 x 1 to %.0f megapixels)", r->path,
+            (long long)width, (long long)height, (long long)channels, IMAGE_MEGAPIXELS_MAX(channels));
     out->width = (int)width;
     out->height = (int)height;
     return GBT_OK;

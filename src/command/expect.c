@@ -57,11 +57,11 @@ expectation expect_training(const scene *s, double downscale, int threads, cpu_i
 json_t *expect_to_json(const expectation *e)
 {
     const memory_need *m = &e->memory;
-    return json_pack("{s:f,s:{s:f,s:f,s:f,s:f,s:f,s:f,s:f},s:f,s:f,s:f,s:i}", "bytes", m->whole, "memory",
-                     "program", m->program, "reading", m->reading, "points", m->points, "trees", m->trees,
-                     "photos", m->photos, "anchors", m->anchors, "view", m->view, "least_bytes", m->least,
-                     "step_seconds", e->step_seconds, "score_seconds", e->score_seconds, "threads",
-                     e->threads);
+    return json_pack("{s:f,s:{s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:f},s:f,s:f,s:f,s:i}", "bytes", m->whole, "memory",
+                     "program", m->program, "reading", m->reading, "decoding", m->decoding, "points",
+                     m->points, "trees", m->trees, "photos", m->photos, "anchors", m->anchors, "view",
+                     m->view, "least_bytes", m->least, "step_seconds", e->step_seconds, "score_seconds",
+                     e->score_seconds, "threads", e->threads);
 }
 
 /* Two digits are more than is known. */
@@ -81,11 +81,12 @@ void expect_print(const expectation *e, FILE *out)
     if (e->score_seconds > 0)
         fprintf(out, ", then %.0f s for the scores", fmax(1, rounded(e->score_seconds)));
     const memory_need *m = &e->memory;
-    fprintf(out,
-            "\n  memory    of that, MB: program %.0f; at first files %.0f, then trees %.0f, then anchors "
-            "%.0f and a "
-            "view %.0f; all along points %.0f, photos %.0f; the least limit %.0f MiB\n",
-            rounded(m->program / 1e6), rounded(m->reading / 1e6), rounded(m->trees / 1e6),
-            rounded(m->anchors / 1e6), rounded(m->view / 1e6), rounded(m->points / 1e6),
-            rounded(m->photos / 1e6), ceil(m->least / 0x1p20));
+    fprintf(
+        out,
+        "\n  memory    of that, MB: program %.0f; at first files %.0f, then photos as they are read %.0f, "
+        "then trees %.0f, then anchors %.0f and a view %.0f; all along points %.0f, photos %.0f; the least "
+        "limit %.0f MiB\n",
+        rounded(m->program / 1e6), rounded(m->reading / 1e6), rounded(m->decoding / 1e6),
+        rounded(m->trees / 1e6), rounded(m->anchors / 1e6), rounded(m->view / 1e6), rounded(m->points / 1e6),
+        rounded(m->photos / 1e6), ceil(m->least / 0x1p20));
 }

@@ -87,8 +87,12 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
     gbt_status status = read_stored(view, &stored, valid, err);
     if (status == GBT_OK)
         status = is_premultiplied(view->path, &stored, &premultiplied, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && stored.channels == 3) {
+        rgb = stored;
+        stored = (image){0};
+    } else if (status == GBT_OK) {
         status = to_rgb(&stored, view->alpha, premultiplied, &rgb, err);
+    }
     if (status == GBT_OK && through != NULL)
         status = read_through(&stored, view->alpha, width, height, through, err);
     image_free(&stored);

@@ -87,6 +87,7 @@ static void check_view(photo_check *c, scene_view *view)
         const bool is_first = c->found++ == 0;
         c->with_alpha += h.has_alpha;
         view->photo_width = h.width;
+        view->has_alpha = h.has_alpha;
         c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
         c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
         c->max_width = h.width > c->max_width ? h.width : c->max_width;

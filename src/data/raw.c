@@ -14,6 +14,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/paged.h"
+#include "base/vec.h"
 
 enum { CHECK_POINTS = 1 << 14 };
 
@@ -118,12 +119,17 @@ gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double 
     float *depths = mem_alloc(view->seen_count, sizeof *depths, "depths", err);
     if (depths == NULL)
         return GBT_ERR_NO_MEMORY;
+    camera_lens lens;
+    const bool all_around = camera_lens_prepare(&view->camera, &lens) && !camera_lens_looks_forward(&lens);
     size_t count = 0;
     for (size_t i = 0; i < view->seen_count; i++) {
-        double z = 0;
-        for (int k = 0; k < 3; k++)
-            z += view->camera.rotation[6 + k] *
-                 (raw->position[3 * (size_t)view->seen[i] + (size_t)k] - view->camera.center[k]);
+        double z = 0, d[3];
+        for (int k = 0; k < 3; k++) {
+            d[k] = raw->position[3 * (size_t)view->seen[i] + (size_t)k] - view->camera.center[k];
+            z += view->camera.rotation[6 + k] * d[k];
+        }
+        if (all_around)
+            z = dvec_length(d);
         if (z > 0 && z <= RAW_COORDINATE_LIMIT)
             depths[count++] = (float)z;
     }

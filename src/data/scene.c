@@ -285,21 +285,29 @@ static double median(const double *values, size_t stride, size_t count)
     return value;
 }
 
+/* Of the camera centres; `first` is that of the first of `count` views, each of so many bytes. */
+static gbt_status median_center(const gbt_camera *first, size_t view_bytes, size_t count, double out[3],
+                                gbt_error *err)
+{
+    double *centers = mem_alloc(count, 3 * sizeof *centers, "camera centres", err);
+    if (centers == NULL)
+        return GBT_ERR_NO_MEMORY;
+    for (size_t i = 0; i < count; i++)
+        memcpy(centers + 3 * i, ((const gbt_camera *)((const char *)first + i * view_bytes))->center,
+               3 * sizeof *centers);
+    for (size_t k = 0; k < 3; k++)
+        out[k] = median(centers + k, 3, count);
+    mem_free(centers);
+    return GBT_OK;
+}
+
 static gbt_status find_origin(const raw_scene *raw, double origin[3], gbt_error *err)
 {
     for (size_t k = 0; k < 3 && raw->point_count > 0; k++)
         origin[k] = median(raw->position + k, 3, raw->point_count);
     if (raw->point_count > 0 || raw->view_count == 0)
         return GBT_OK;
-    double *centers = mem_alloc(raw->view_count, 3 * sizeof *centers, "camera centres", err);
-    if (centers == NULL)
-        return GBT_ERR_NO_MEMORY;
-    for (size_t i = 0; i < raw->view_count; i++)
-        memcpy(centers + 3 * i, raw->views[i].camera.center, 3 * sizeof *centers);
-    for (size_t k = 0; k < 3; k++)
-        origin[k] = median(centers + k, 3, raw->view_count);
-    mem_free(centers);
-    return GBT_OK;
+    return median_center(&raw->views[0].camera, sizeof *raw->views, raw->view_count, origin, err);
 }
 
 /* Every n-th sighting, so that no more than SCENE_SEEN_MAX remain, and the depth of the nearest. */
@@ -418,6 +426,23 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err)
 {
     return load(path, split, false, out, err);
+}
+
+gbt_status scene_forget_points(scene *s, bool recentres, gbt_error *err)
+{
+    double middle[3] = {0, 0, 0};
+    if (recentres && s->view_count > 0)
+        GBT_TRY(median_center(&s->views[0].camera, sizeof *s->views, s->view_count, middle, err));
+    s->points.count = 0;
+    for (size_t k = 0; k < 3; k++)
+        s->origin[k] += middle[k];
+    for (size_t i = 0; i < s->view_count; i++) {
+        s->views[i].seen_count = 0;
+        s->views[i].nearest = 0;
+        for (size_t k = 0; k < 3; k++)
+            s->views[i].camera.center[k] -= middle[k];
+    }
+    return GBT_OK;
 }
 
 void scene_free(scene *s)

@@ -23,6 +23,7 @@ typedef struct scene_view {
                           owned */
     gbt_alpha alpha;   /* see scene_set_alpha() */
     int photo_width;   /* as the photo's header says; 0: not read (photo_check_all()), or unreadable */
+    bool has_alpha;    /* likewise: the photo has an alpha channel */
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
     size_t rank; /* place in the sorted list of all views that the data set names, those without a photo too
@@ -98,6 +99,10 @@ gbt_status scene_load(const char *path, const scene_split *split, scene *out, gb
 
 /** scene_load() with the origin 0: coordinates are the world's, rounded to float where they are points. */
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
+/** Forget the sparse points, and what they say of photos; `recentres`: the origin becomes that of a scene
+    without points. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status scene_forget_points(scene *s, bool recentres, gbt_error *err);
 
 void scene_free(scene *s);
 static inline void scene_view_free(scene_view *view)

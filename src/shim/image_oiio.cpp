@@ -196,8 +196,8 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
     if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples ||
         tile * spec.nchannels > max_samples)
         return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: image of %d x %d pixels and %d channels (wanted at most 2^28 samples)", path,
-                         spec.width, spec.height, spec.nchannels);
+                         "%s: image of %d x %d pixels and %d channels (wanted at most %.0f megapixels)", path,
+                         spec.width, spec.height, spec.nchannels, IMAGE_MEGAPIXELS_MAX(spec.nchannels));
     o->is_grey = spec.nchannels == 1 || (spec.nchannels == 2 && spec.alpha_channel == 1);
     if (!o->is_grey && spec.nchannels == 2)
         return base_fail(err, GBT_ERR_FORMAT,
@@ -367,8 +367,8 @@ gbt_status check_source(const image *im, gbt_error *err)
                          "image: nothing that can be encoded (wanted pixels of 1 to 4 channels)");
     if (int64_t(im->width) * im->height > max_samples ||
         int64_t(im->width) * im->height * im->channels > max_samples)
-        return base_fail(err, GBT_ERR_ARGUMENT, "image: %d x %d x %d (wanted at most 2^28 samples)",
-                         im->width, im->height, im->channels);
+        return base_fail(err, GBT_ERR_ARGUMENT, "image: %d x %d x %d (wanted at most %.0f megapixels)",
+                         im->width, im->height, im->channels, IMAGE_MEGAPIXELS_MAX(im->channels));
     return GBT_OK;
 }
 

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/fail.h"
 #include "base/file.h"
@@ -121,6 +122,19 @@ static void add_poses(container_writer *w, const trainer *t)
     container_add(w, "pose.visits", CONTAINER_U64, 1, &p->count, p->visits);
 }
 
+/* The old file under both names, so that one of the usual name is there whatever happens while the new one is
+   written. Where files cannot have two names it is moved: whoever resumes looks at PATH.prev next. */
+static gbt_status keep_previous(const char *path, gbt_error *err)
+{
+    char previous[4096];
+    if (snprintf(previous, sizeof previous, "%s.prev", path) >= (int)sizeof previous || !file_exists(path))
+        return GBT_OK;
+    unlink(previous);
+    if (link(path, previous) == 0 || rename(path, previous) == 0)
+        return GBT_OK;
+    return base_fail(err, GBT_ERR_IO, "%s: cannot keep the previous checkpoint: %s", path, strerror(errno));
+}
+
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
@@ -172,16 +186,9 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
         container_add(&w, network_set_names[i], CONTAINER_F32, 1, &n, networks[i]);
     row_sections_add(&w, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->stats.offset_count,
                      t->stats.field);
-    /* A kill between the two renames leaves only PATH.prev: whoever resumes looks there next. */
-    char previous[4096];
-    if (snprintf(previous, sizeof previous, "%s.prev", path) < (int)sizeof previous && file_exists(path)) {
-        if (rename(path, previous) != 0) {
-            container_writer_free(&w);
-            return base_fail(err, GBT_ERR_IO, "%s: cannot keep the previous checkpoint: %s", path,
-                             strerror(errno));
-        }
-    }
-    const gbt_status status = container_save(&w, path, err);
+    gbt_status status = keep_previous(path, err);
+    if (status == GBT_OK)
+        status = container_save(&w, path, err);
     container_writer_free(&w);
     return status;
 }

@@ -9,7 +9,8 @@
    name has another one. Likewise of all masks. GBT_ERR_IO: one cannot be read. */
 gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t *of_masks, gbt_error *err);
 
-/** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev. */
+/** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev, and at PATH until the
+    new one is whole. */
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err);
 
 /**

@@ -10,19 +10,19 @@
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
                     tree_bytes = 100, tree_fixed_bytes = 95, learning_point_bytes = 3000,
-                    model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120,
-                    kept_pixel_bytes = 3;
+                    model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120;
 static const double found_points = 20000, /* by photo consistency, where the data set has none */
     most_points = 131072;                 /* the tree of balls is 18 deep: more points make no more anchors */
 
 memory_need memory_need_of(const scene *s, double downscale)
 {
-    double train_pixels = 0, largest = 0;
+    double train_bytes = 0, largest = 0;
+    const double decoded = photos_decoded_bytes(s);
     for (size_t i = 0; i < s->view_count; i++) {
-        const gbt_camera *c = &s->views[i].camera;
-        const double pixels = (double)c->width * (double)c->height / (downscale * downscale);
+        const scene_view *v = &s->views[i];
+        const double pixels = (double)v->camera.width * (double)v->camera.height / (downscale * downscale);
         largest = fmax(largest, pixels);
-        train_pixels += s->views[i].is_test ? 0 : pixels;
+        train_bytes += v->is_test ? 0 : (3 + (v->mask_path != NULL) + v->has_alpha) * pixels;
     }
     const double points = s->points.count > 0 ? (double)s->points.count : found_points,
                  learning = fmin(points, most_points);
@@ -31,15 +31,18 @@ memory_need memory_need_of(const scene *s, double downscale)
         .reading = (double)s->file_bytes + raw_point_bytes * points,
         .points = point_bytes * points,
         .trees = tree_bytes * points,
-        .photos = fmin(kept_pixel_bytes * train_pixels, (double)PHOTOS_KEPT_BYTES),
+        .decoding = decoded * (double)photos_at_once(s, 0),
+        .photos = fmin(train_bytes, (double)PHOTOS_KEPT_BYTES),
         .anchors = learning_point_bytes * learning,
         .view = fmax(step_pixel_bytes * fmin(largest, TRAIN_STEP_PIXELS), score_pixel_bytes * largest),
     };
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */
-        starting = need.points + need.photos + need.trees,
-                 stepping = need.points + need.photos + need.anchors + need.view;
+        starting = need.points + need.photos + fmax(need.decoding, need.trees),
+                 stepping = need.points + need.photos + need.anchors + fmax(need.view, decoded);
     need.whole = fmax(need.program + fmax(scoring, fmax(starting, stepping)), least_bytes);
-    need.least = fmin(need.whole, 16.0 / 15 * (need.program + fmax(tree_fixed_bytes * points, need.view)));
+    /* Nothing is let go of while a photo is decoded, and photos that are kept take a quarter of the limit. */
+    const double stays = fmax(fmax(tree_fixed_bytes * points, need.view), 5.0 / 4 * decoded);
+    need.least = fmin(need.whole, 16.0 / 15 * (need.program + stays));
     need.least = fmax(need.least, least_bytes);
     return need;
 }

@@ -7,10 +7,11 @@
 
 /** Bytes. Reading, trees and steps follow each other. */
 typedef struct memory_need {
-    double program; /* its libraries, and buffers of threads */
-    double reading; /* the data set's files and what is kept of them, while they are read */
-    double points;  /* sparse points, for the whole run */
-    double trees;   /* over them, at the start */
+    double program;  /* its libraries, and buffers of threads */
+    double reading;  /* the data set's files and what is kept of them, while they are read */
+    double points;   /* sparse points, for the whole run */
+    double trees;    /* over them, at the start */
+    double decoding; /* photos as they are stored, while they are read */
     double photos, anchors,
         view;     /* while steps are made: those that are kept; with all that learns; one of them */
     double whole; /* the largest sum */

@@ -11,11 +11,15 @@
 #include "base/image_header.h"
 #include "base/machine.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "data/photo_size.h"
 #include "train/photo_pick.h"
 
 enum { USUAL_WIDTH = 1600 /* as in 3DGS */ };
+/* Of a stored pixel: its floats and its samples, or its floats at two sizes; with alpha or a mask both of
+   these. */
+static const double decoded_pixel_bytes = 24, decoded_alpha_bytes = 40;
 
 static double median(float *values, size_t count)
 {
@@ -51,14 +55,39 @@ gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *dow
     return photos_downscale_to(s, limits_width ? USUAL_WIDTH : HUGE_VAL, downscale, err);
 }
 
-/* Nothing but time depends on it. */
-static size_t kept_bytes(void)
+/* One `part`-th of the memory that is free. Nothing but time depends on it. */
+static size_t free_share(size_t part)
 {
     const machine m = machine_read("");
-    size_t kept = PHOTOS_KEPT_BYTES;
-    if (m.memory_free_bytes > 0 && m.memory_free_bytes / 2 < kept)
-        kept = m.memory_free_bytes / 2;
-    return m.memory_limit_bytes / 2 < kept ? m.memory_limit_bytes / 2 : kept;
+    const size_t least = m.memory_free_bytes > 0 && m.memory_free_bytes < m.memory_limit_bytes
+                             ? m.memory_free_bytes
+                             : m.memory_limit_bytes;
+    return least / part;
+}
+
+static size_t kept_bytes(void)
+{
+    const size_t half = free_share(2);
+    return half < PHOTOS_KEPT_BYTES ? half : PHOTOS_KEPT_BYTES;
+}
+
+double photos_decoded_bytes(const scene *s)
+{
+    double largest = 0;
+    for (size_t i = 0; i < s->view_count; i++) {
+        const scene_view *v = &s->views[i];
+        const double ratio = v->photo_width > 0 ? (double)v->photo_width / v->camera.width : 1;
+        largest =
+            fmax(largest, (v->has_alpha || v->mask_path != NULL ? decoded_alpha_bytes : decoded_pixel_bytes) *
+                              ratio * ratio * (double)v->camera.width * (double)v->camera.height);
+    }
+    return largest;
+}
+
+size_t photos_at_once(const scene *s, size_t most)
+{
+    const double fitting = (double)(most > 0 ? most : free_share(4)) / fmax(photos_decoded_bytes(s), 1);
+    return (size_t)fmin(fmax(fitting, 1), parallel_threads());
 }
 
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err)
@@ -66,7 +95,8 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     *p = (photos){.source = source,
                   .downscale = downscale > 0 ? downscale : 1,
                   .bytes_max = kept_bytes(),
-                  .passing = SIZE_MAX};
+                  .passing = SIZE_MAX,
+                  .level_passing = SIZE_MAX};
     p->full = mem_calloc(source->view_count, sizeof *p->full, "photo cache", err);
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
@@ -126,10 +156,17 @@ static void from_bytes(const unsigned char *bytes, image *out)
     photo_pick_pixels(bytes, out->width, &(photo_pick){.step = 1}, NULL, NULL, out);
 }
 
+static size_t pixel_count(const photos *p, size_t view, int level)
+{
+    const gbt_camera camera = photos_camera(p, view, level);
+    return (size_t)camera.width * (size_t)camera.height;
+}
+
+/* With its marks and how transparent it is. */
 static size_t full_bytes(const photos *p, size_t view)
 {
-    const gbt_camera camera = photos_camera(p, view, 0);
-    return 3 * (size_t)camera.width * (size_t)camera.height;
+    const scene_view *v = &p->source->views[view];
+    return (size_t)(3 + (v->mask_path != NULL) + v->has_alpha) * pixel_count(p, view, 0);
 }
 
 static void drop_full(photos *p, size_t view)
@@ -184,47 +221,59 @@ gbt_status photos_read_full(photos *p, size_t view, gbt_error *err)
     return GBT_OK;
 }
 
+typedef gbt_status read_one(photos *p, size_t view, gbt_error *err);
+
 typedef struct load_job {
     photos *photos;
     const size_t *views;
+    size_t count, at_once;
+    read_one *one;
     gbt_status *status; /* of each */
     gbt_error *error;
 } load_job;
 
-static void load_one(size_t block, size_t begin, size_t end, void *context)
+static gbt_status load_one(photos *p, size_t view, gbt_error *err)
 {
-    (void)end;
-    const load_job *job = context;
-    const size_t view = job->views[begin];
-    job->status[block] =
-        job->photos->full[view] != NULL ? GBT_OK : read_into(job->photos, view, &job->error[block]);
+    return p->full[view] != NULL ? GBT_OK : read_into(p, view, err);
 }
 
-static void try_one(size_t block, size_t begin, size_t end, void *context)
+static gbt_status try_one(photos *p, size_t view, gbt_error *err)
 {
-    (void)end;
-    const load_job *job = context;
-    const size_t view = job->views[begin];
-    const gbt_camera camera = photos_camera(job->photos, view, 0);
+    const gbt_camera camera = photos_camera(p, view, 0);
     image photo;
     unsigned char *valid;
-    job->status[block] = scene_read_photo_valid(&job->photos->source->views[view], camera.width,
-                                                camera.height, &photo, &valid, &job->error[block]);
+    const gbt_status status =
+        scene_read_photo_valid(&p->source->views[view], camera.width, camera.height, &photo, &valid, err);
     image_free(&photo);
     mem_free(valid);
+    return status;
+}
+
+/* As many blocks as photos that may be decoded at once. */
+static void read_block(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)begin;
+    (void)end;
+    const load_job *job = context;
+    for (size_t i = block; i < job->count; i += job->at_once) {
+        paged_check();
+        job->status[i] = job->one(job->photos, job->views[i], &job->error[i]);
+    }
 }
 
 /* The first failure in the order of the views. */
-static gbt_status run_all(photos *p, const size_t *views, size_t count,
-                          void (*one)(size_t, size_t, size_t, void *), gbt_error *err)
+static gbt_status run_all(photos *p, const size_t *views, size_t count, read_one *one, gbt_error *err)
 {
     load_job job = {.photos = p,
                     .views = views,
+                    .count = count,
+                    .at_once = photos_at_once(p->source, p->decoded_max),
+                    .one = one,
                     .status = mem_calloc(count, sizeof *job.status, "photos", err),
                     .error = mem_calloc(count, sizeof *job.error, "photos", err)};
     gbt_status status = job.status == NULL || job.error == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK)
-        parallel_blocks(count, 1, one, &job);
+        parallel_blocks(job.at_once, 1, read_block, &job);
     for (size_t i = 0; status == GBT_OK && i < count; i++)
         if (job.status[i] != GBT_OK)
             status = base_fail(err, job.status[i], "%s", job.error[i].text);
@@ -254,7 +303,7 @@ gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *
 
 gbt_status photos_try(photos *p, const size_t *views, size_t count, gbt_error *err)
 {
-    return run_all(p, views, count_fitting(p, views, count), try_one, err);
+    return run_all(p, views, count, try_one, err);
 }
 
 static gbt_status get_full(photos *p, size_t view, image *out, gbt_error *err)
@@ -272,7 +321,7 @@ gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *
     for (size_t i = 0; i < count && !*any; i++) {
         GBT_TRY(photos_read_full(p, views[i], err));
         const unsigned char *valid = p->full_valid[views[i]];
-        *any = valid == NULL || memchr(valid, 1, full_bytes(p, views[i]) / 3) != NULL;
+        *any = valid == NULL || memchr(valid, 1, pixel_count(p, views[i], 0)) != NULL;
     }
     return GBT_OK;
 }
@@ -292,18 +341,46 @@ const unsigned char *photos_valid(const photos *p, size_t view)
     return p->level == 0 ? p->full_valid[view] : p->valid[view];
 }
 
+static void drop_level_passing(photos *p)
+{
+    if (p->level_passing == SIZE_MAX)
+        return;
+    unsigned char **const caches[] = {p->pixels, p->valid};
+    for (int i = 0; i < 2; i++) {
+        mem_free(caches[i][p->level_passing]);
+        caches[i][p->level_passing] = NULL;
+    }
+    p->level_passing = SIZE_MAX;
+}
+
+/* What was made for `level` stays if there is room, else until the next is made. */
+static void count_level(photos *p, size_t view)
+{
+    const size_t more = (size_t)(3 + (p->valid[view] != NULL)) * pixel_count(p, view, p->level);
+    if (p->bytes + more > p->bytes_max) {
+        p->level_passing = view;
+        return;
+    }
+    p->bytes += more;
+    p->level_bytes += more;
+}
+
 gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err)
 {
     if (level != p->level) {
         drop_all(p->pixels, p->source->view_count);
         drop_all(p->valid, p->source->view_count);
         p->level = level;
+        p->bytes -= p->level_bytes;
+        p->level_bytes = 0;
+        p->level_passing = SIZE_MAX;
     }
     if (level == 0)
         return get_full(p, view, out, err);
     const gbt_camera camera = photos_camera(p, view, level);
     if (p->pixels[view] == NULL) {
         image full = {0}, small = {0};
+        drop_level_passing(p);
         gbt_status status = get_full(p, view, &full, err);
         if (status == GBT_OK)
             status = photo_resize(&full, camera.width, camera.height, &small, err);
@@ -314,6 +391,7 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
         image_free(&full);
         image_free(&small);
         GBT_TRY(status);
+        count_level(p, view);
     }
     GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
     from_bytes(p->pixels[view], out);

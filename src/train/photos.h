@@ -6,18 +6,22 @@
 
 #include "data/scene.h"
 
-/** Bytes of photos at full size that a run keeps at most: half of the memory that is free, and this. */
+/** Bytes of photos that a run keeps at most: half of the memory that is free, and this. */
 #define PHOTOS_KEPT_BYTES ((size_t)1 << 32)
 
 typedef struct photos {
     const scene *source; /* borrowed */
     double downscale;
-    size_t bytes_max; /* of photos at full size that are kept; the others are read whenever they are asked for
-                       */
+    size_t bytes_max; /* of photos that are kept, at level 0 and `level`; the others are made whenever they
+                         are asked for */
     size_t bytes;     /* of those that are */
     size_t passing;   /* a view whose photo stays until the next that finds no room; SIZE_MAX: none */
     int level;
-    unsigned char **full;   /* [view_count] at level 0, NULL until asked for */
+    size_t level_bytes;   /* of `bytes`, at `level` > 0 */
+    size_t level_passing; /* as `passing`, at `level` > 0 */
+    size_t decoded_max;   /* bytes that photos take while they are decoded at once; 0: a quarter of the memory
+                             that is free */
+    unsigned char **full; /* [view_count] at level 0, NULL until asked for */
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
     unsigned char **full_valid,
         **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
@@ -49,15 +53,21 @@ gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *dow
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);
 void photos_close(photos *p);
 
-/** Read the photos of `views` now, on all threads, as many as may be kept; else each is read when first asked
-    for. The first failure in their order is reported. */
+/** Bytes that the largest photo of a scene takes while it is decoded and made smaller, at most. */
+double photos_decoded_bytes(const scene *s);
+
+/** How many photos of a scene are decoded at once: as many as threads, if they take no more than `most` bytes
+    (0: a quarter of the memory that is free); at least 1. */
+size_t photos_at_once(const scene *s, size_t most);
+
+/** Read the photos of `views` now, photos_at_once(), as many as may be kept; else each is read when first
+    asked for. The first failure in their order is reported. */
 gbt_status photos_load(photos *p, const size_t *views, size_t count, gbt_error *err);
 
 /** Read a photo into p->full, if it is not there: it stays, or stays until the next that finds no room. */
 gbt_status photos_read_full(photos *p, size_t view, gbt_error *err);
 
-/** Read the photos of `views` and keep none: what fails now would fail when they are read later. As many, on
-    as many threads, as photos_load() would read. */
+/** Read the photos of `views` and keep none, likewise: what fails now would fail when they are read later. */
 gbt_status photos_try(photos *p, const size_t *views, size_t count, gbt_error *err);
 
 /** Camera of a photo that is divided: its size is round(stated / divide), at least 1. */

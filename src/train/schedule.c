@@ -95,7 +95,8 @@ float schedule_threshold_factor(double steps)
 
 double schedule_rate_end(double steps) { return fmin(fmax(sqrt(4000 / fmax(steps, 1)), 0.1), 1); }
 
-double schedule_level_start(int level, int start_level)
+/* Progress at which `level` begins. */
+static double level_start(int level, int start_level)
 {
     if (level >= start_level)
         return 0;
@@ -105,7 +106,7 @@ double schedule_level_start(int level, int start_level)
 int schedule_level(double progress, int start_level)
 {
     int level = start_level;
-    while (level > 0 && progress >= schedule_level_start(level - 1, start_level))
+    while (level > 0 && progress >= level_start(level - 1, start_level))
         level--;
     return level;
 }

@@ -54,9 +54,6 @@ int pace_segment(const pace *p, uint64_t step);
  */
 int schedule_level(double progress, int start_level);
 
-/** Progress at which `level` begins. */
-double schedule_level_start(int level, int start_level);
-
 /**
  * How much an anchor must bring, (0, 1]: what growth and pruning ask of it is multiplied by this.
  *

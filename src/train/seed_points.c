@@ -332,7 +332,8 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
         kept++;
     if (kept == 0)
         return base_fail(err, GBT_ERR_FORMAT,
-                         "no sparse points, and no place that several photos see (check the poses)");
+                         "no sparse points, and no place that several photos see (check the poses; photos "
+                         "from one place, only turned, give no depth)");
     mem_free(out->position); /* a cloud of no points owns its arrays too */
     mem_free(out->color);
     out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);

@@ -67,8 +67,7 @@ static const gbt_train_setting settings[] = {
      .help = "anti-aliasing: variance of a ray's pixel footprint, px^2; 0: infinitely thin rays"},
     {NAMED("near", near), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
      .help = "near clipping distance, as a fraction of the nearest depth at which the photos see sparse "
-             "points; at "
-             "least 2 % of the median distance"},
+             "points; at least 2 % of the median distance, but for a photo with nearer points of its own"},
     {NAMED("start-level", start_level), RANGE(INT, 0, 4, "L"), .number = 2, .saved = true, .rare = true,
      .help = "start by training on one random pixel in 4^L"},
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",

@@ -30,14 +30,16 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     if (all == NULL)
         return GBT_ERR_NO_MEMORY;
     size_t count = 0;
-    for (size_t v = 0; v < t->train_count; v++) {
-        const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
-        for (size_t i = 0; i < t->anchors.count; i += stride) {
-            double distance;
-            if (camera_sees(camera, t->anchors.position + 3 * i, &distance))
-                all[count++] = (float)distance;
+    /* The first sample that a picture shows; in the last pass, when none does, in any direction. */
+    for (size_t pass = 0; pass <= stride && count == 0; pass++)
+        for (size_t v = 0; v < t->train_count; v++) {
+            const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
+            for (size_t i = pass % stride; i < t->anchors.count; i += stride) {
+                double distance;
+                if (camera_sees(camera, t->anchors.position + 3 * i, &distance) || pass == stride)
+                    all[count++] = (float)distance;
+            }
         }
-    }
     *p5 = *median = *p95 = 1;
     if (count > 0) {
         qsort(all, count, sizeof *all, compare_floats);
@@ -78,6 +80,20 @@ static void mean_color(const scene_points *points, float color[3])
         color[c] = (float)(sum[c] / (double)points->count);
 }
 
+/* From a camera to the points: the median over a sample of them. */
+static double middle_distance(const gbt_camera *camera, const scene_points *points)
+{
+    float distances[512];
+    size_t count = 0;
+    for (size_t i = 0; i < points->count; i += points->count / 512 + 1) {
+        double distance;
+        camera_sees(camera, points->position + 3 * i, &distance);
+        distances[count++] = (float)distance;
+    }
+    qsort(distances, count, sizeof *distances, compare_floats);
+    return count > 0 ? (double)distances[count / 2] : 0;
+}
+
 static gbt_status make_anchors(trainer *t, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
@@ -89,12 +105,13 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.balls.voxel_size = t->voxel_size;
     def.offset_count = t->def.offsets;
     def.scale_factor = (float)t->def.scale_factor;
-    /* Cameras that stand together say nothing of the size of what they see. */
-    const double away =
-        dvec_length(t->scene.views[t->train_views[0]].camera.center); /* from the middle of the points */
+    /* Cameras that stand together say nothing of the size of what they see; and in the middle of it they are
+       not away from the middle of the points. */
+    const scene_points *points = &t->scene.points;
+    const gbt_camera *camera = &t->scene.views[t->train_views[0]].camera;
+    const double away = fmax(dvec_length(camera->center), middle_distance(camera, points));
     t->first_scale_max = t->rules.limits_first_scale ? 0.1 * fmax(t->extent, 0.1 * away) : (double)INFINITY;
     def.scale_max = (float)t->first_scale_max;
-    const scene_points *points = &t->scene.points;
     GBT_TRY(anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def,
                          &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;

@@ -20,15 +20,25 @@ enum { FEW_PLACES = 128 };
 
 /* ---- points ---- */
 
-/* Points that no training photo sees say nothing about what to render. */
-static bool any_point_is_seen(const trainer *t)
+/* Every n-th point first: those that are listed one after another often lie in one place. */
+static bool sees_a_point(const gbt_camera *camera, const scene_points *points)
 {
-    for (size_t i = 0; i < t->scene.points.count; i++)
-        for (size_t v = 0; v < t->train_count; v++)
-            if (camera_sees(&t->scene.views[t->train_views[v]].camera, t->scene.points.position + 3 * i,
-                            NULL))
+    const size_t stride = points->count / 512 + 1;
+    for (size_t first = 0; first < stride; first++)
+        for (size_t i = first; i < points->count; i += stride)
+            if (camera_sees(camera, points->position + 3 * i, NULL))
                 return true;
     return false;
+}
+
+/* Training photos that see a point; half of them are enough. Points that most photos do not see say nothing
+   about what to render: they may be in another coordinate system, with a few of them in view by chance. */
+static size_t count_seeing(const trainer *t)
+{
+    size_t seeing = 0;
+    for (size_t v = 0; v < t->train_count && 2 * seeing < t->train_count; v++)
+        seeing += sees_a_point(&t->scene.views[t->train_views[v]].camera, &t->scene.points);
+    return seeing;
 }
 
 static int compare_points(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(float)); }
@@ -63,26 +73,27 @@ static gbt_status append_points(scene_points *points, const scene_points *more, 
     return GBT_OK;
 }
 
-/* Points of our own where the data set has none, none that a photo sees, or few; the reference method takes
-   what there is. */
+/* Points of our own where the data set has none, none that half of the photos see, or few; the reference
+   method takes few as they are. */
 static gbt_status provide_points(trainer *t, gbt_error *err)
 {
     scene_points *points = &t->scene.points, made = {0};
     size_t places = 0;
-    if (any_point_is_seen(t))
+    const size_t seeing = count_seeing(t);
+    const bool blind = 2 * seeing < t->train_count;
+    if (!blind)
         GBT_TRY(count_places(points, FEW_PLACES, &places, err));
-    const bool blind = places == 0, few = places < FEW_PLACES && t->rules.adds_to_few_points;
+    const bool few = places < FEW_PLACES && t->rules.adds_to_few_points;
     t->points_used = points->count;
     snprintf(t->start_text, sizeof t->start_text, "%zu sparse points", points->count);
     if (!blind && !few)
         return GBT_OK;
     if (blind && points->count > 0)
-        log_warn("%s: no training photo sees any of the %zu sparse points", t->scene.folder, points->count);
-    if (blind) {
-        points->count = 0;
-        for (size_t i = 0; i < t->scene.view_count; i++)
-            t->scene.views[i].seen_count = 0;
-    }
+        log_warn("%s: %zu of %zu training photos see no sparse point, and none is used: are points and poses "
+                 "in one coordinate system?",
+                 t->scene.folder, t->train_count - seeing, t->train_count);
+    if (blind)
+        GBT_TRY(scene_forget_points(&t->scene, t->rules.recentres, err));
     gbt_error why = {0};
     gbt_status status =
         seed_points_make(&t->photos, t->train_views, t->train_count, t->def.seed, &made, &why);
@@ -96,8 +107,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
              t->points_used, made.count);
     if (blind)
         snprintf(t->start_text, sizeof t->start_text,
-                 "%zu points found by photo consistency (the data set has none that are seen)", made.count);
-    t->points_made = blind;
+                 "%zu points found by photo consistency (the data set has none that half of the photos see)",
+                 made.count);
     t->points_used = points->count;
     mem_free(made.position);
     mem_free(made.color);
@@ -169,8 +180,7 @@ static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
 
 /* What is held out is read after the last step, to score it: what could not be read then is told now. The
    headers of all photos have been seen, which tell of files that are cut and of other shapes; damaged pixels
-   are looked for in no more photos than are trained on, so that a run takes at most twice as long to start.
- */
+   are looked for in no more photos than are trained on, so that it takes no longer than to read those. */
 static gbt_status try_held_out(trainer *t, gbt_error *err)
 {
     const size_t most = t->test_count < t->train_count ? t->test_count : t->train_count;
@@ -220,6 +230,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     GBT_TRY(choose_downscale(t, err));
     GBT_TRY(check_memory(t, err));
     GBT_TRY(photos_open(&t->photos, &t->scene, def->downscale, err));
+    t->photos.decoded_max = def->memory / 4;
     if (def->memory > 0 && t->photos.bytes_max > def->memory / 4)
         t->photos.bytes_max = def->memory / 4;
     GBT_TRY(photos_load(&t->photos, t->train_views, t->train_count, err));

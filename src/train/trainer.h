@@ -61,7 +61,6 @@ struct trainer {
     trace_settings settings;
     sky_moments sky; /* of the background in `settings`, where it varies */
     size_t anchors_initial, points_used;
-    bool points_made;     /* the data set has no sparse points: ours */
     char start_text[160]; /* what the run starts from, for people */
 
     pace pace;

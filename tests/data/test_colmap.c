@@ -144,6 +144,34 @@ static void nearest_in_a_photo(void **state)
     raw_free(&raw);
 }
 
+/* A panorama has points on all sides, and its rays start in all directions: distances count, not depths. */
+static void nearest_around_a_panorama(void **state)
+{
+    (void)state;
+    enum { AROUND = 100 };
+    static const float grey[3] = {0.5f, 0.5f, 0.5f};
+    raw_scene raw = {0};
+    raw_view *view = raw_next_view(&raw, NULL);
+    view->camera = (gbt_camera){.model = GBT_CAMERA_EQUIRECTANGULAR,
+                                .width = 64,
+                                .height = 32,
+                                .params = {64, 32},
+                                .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                .center = {0, 0, 1}};
+    raw.view_count = 1;
+    assert_int_equal(raw_reserve_points(&raw, AROUND, NULL), GBT_OK);
+    for (int i = 0; i < AROUND; i++) {
+        const double z = (2 * i + 1.0) / AROUND - 1, side = 2 * sqrt(1 - z * z);
+        const double position[3] = {side * cos(i), side * sin(i), 1 + 2 * z};
+        assert_int_equal(raw_add_sighting(&raw, 0, position, NULL), GBT_OK);
+        raw_add_point(&raw, position, grey);
+    }
+    double nearest;
+    assert_int_equal(raw_nearest_depth(&raw, view, &nearest, NULL), GBT_OK);
+    assert_true(fabs(nearest - 2) < 1e-6);
+    raw_free(&raw);
+}
+
 /* The cursor itself, at its exact ends: one byte past them reads as 0 and is noticed, and nothing moves. */
 static void cursor_ends(void **state)
 {
@@ -848,6 +876,7 @@ int main(void)
         cmocka_unit_test(cursor_ends),
         cmocka_unit_test(good_model),
         cmocka_unit_test(nearest_in_a_photo),
+        cmocka_unit_test(nearest_around_a_panorama),
         cmocka_unit_test(duplicate_cameras),
         cmocka_unit_test(colmap_4_rig),
         cmocka_unit_test(name_length_limit),

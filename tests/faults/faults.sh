@@ -76,6 +76,7 @@ look() { # name, kind of end
     kill) [ "$code" = 137 ] || [ "$code" = 0 ] || bad "$name" "exit code $code after a kill" ;;
     esac
     # What was there is whole, old or new.
+    [ ! -e base/run/checkpoints/last.gbt ] || [ -e case/run/checkpoints/last.gbt ] || bad "$name" "no last.gbt"
     if [ -e case/run/model.gbt ]; then
         "$program" info case/run >info 2>&1 || { cp info said; bad "$name" "the run is damaged"; }
     fi

@@ -3,6 +3,7 @@
    below it. */
 #include "run_support.h"
 
+#include "base/parallel.h"
 #include "child.h"
 #include "train/memory_need.h"
 
@@ -95,6 +96,14 @@ static void what_it_takes(void **state)
     assert_true(small.least > small.program && small.whole >= small.least);
     assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least &&
                 fine.photos < large.photos);
+    for (size_t i = 0; i < s.view_count; i++)
+        s.views[i].photo_width = 100 * s.views[i].camera.width; /* as stored: 17 megapixels */
+    const memory_need stored = memory_need_of(&s, 1);
+    assert_true(stored.decoding >= 24.0 * 4800 * 3600 && stored.least > 24.0 * 4800 * 3600);
+    assert_true(stored.photos == small.photos && stored.whole > stored.decoding + stored.program);
+    assert_int_equal(photos_at_once(&s, 1), 1);
+    assert_int_equal(photos_at_once(&s, SIZE_MAX), parallel_threads());
+    assert_true(photos_at_once(&s, (size_t)(24.0 * 4800 * 3600 * 1.5)) == 1);
     scene_free(&s);
 }
 

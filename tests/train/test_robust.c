@@ -585,15 +585,16 @@ static void opacities_are_raised(void **state)
 
 /* ---- poor points ---- */
 
+enum { POINTS_MOST = 1200 };
+
 /* A copy of the tiny scene, in units of which each of its own has `unit`, with the first `keep` of its
    points, moved along the optical axes by `shift`. Returns its folder. */
 static const char *copy_tiny(const char *name, const scene *s, size_t keep, double unit, double shift)
 {
     colmap_image pictures[VIEWS];
-    colmap_point points[200];
+    static colmap_point points[POINTS_MOST];
     memset(pictures, 0, sizeof pictures);
-    memset(points, 0, sizeof points);
-    assert_true(s->view_count == VIEWS && keep <= 200);
+    assert_true(s->view_count == VIEWS && keep <= POINTS_MOST);
     const char *folder = in_root("%s", name);
     assert_ok(file_make_folder(folder, NULL));
     assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
@@ -611,6 +612,13 @@ static const char *copy_tiny(const char *name, const scene *s, size_t keep, doub
     return folder;
 }
 
+static void note_unseen(const gbt_event *event, void *seen)
+{
+    if (event->kind == GBT_EVENT_WARNING &&
+        strstr(event->text, "training photos see no sparse point") != NULL)
+        *(bool *)seen = true;
+}
+
 static void points_that_tell_nothing_are_replaced(void **state)
 {
     (void)state;
@@ -618,27 +626,123 @@ static void points_that_tell_nothing_are_replaced(void **state)
         const char *name;
         size_t keep;
         double shift;
-        bool made;
+        bool by_one; /* a single photo, and at most its neighbours, see a single point */
         const char *says;
     } cases[] = {{"few", 60, 0, false, "60 sparse points and "},
-                 {"unseen", 150, 1e4, true, "none that are seen"},
-                 {"all", 150, 0, false, "150 sparse points"}};
+                 {"unseen", 150, 1e4, false, "none that half of the photos see"},
+                 {"all", 150, 0, false, "150 sparse points"},
+                 {"chance", 150, 1e4, true, "none that half of the photos see"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         scene s;
         const scene_split split = {.kind = SCENE_SPLIT_NONE};
         assert_ok(scene_load(tiny, &split, &s, NULL));
+        const gbt_camera *camera = &s.views[3].camera;
+        for (size_t k = 0; k < 3 && cases[i].by_one; k++)
+            s.points.position[k] =
+                (float)(camera->center[k] + 1e4 * camera->rotation[6 + k] - (k == 2 ? cases[i].shift : 0));
         const char *folder = copy_tiny(cases[i].name, &s, cases[i].keep, 1, cases[i].shift);
         gbt_train_def def = run_def();
         trainer t;
         step_report r;
+        bool warned = false;
+        gbt_listen(note_unseen, &warned);
         open_ok(&t, folder, &def);
-        if (t.points_made != cases[i].made || strstr(t.start_text, cases[i].says) == NULL)
+        be_quiet();
+        if (warned != (cases[i].shift > 0) || strstr(t.start_text, cases[i].says) == NULL)
             fail_msg("%s: %s", cases[i].name, t.start_text);
         assert_true(i == 2 ? t.scene.points.count == 150 : t.scene.points.count > 400);
+        for (size_t v = 0; v < t.scene.view_count; v++) /* the origin is near the cameras, too */
+            assert_true(fabs(t.scene.views[v].camera.center[2]) < 100);
         step_ok(&t, &r);
         trainer_free(&t);
         scene_free(&s);
     }
+}
+
+/* The world stays where it is, and the origin is among the cameras. */
+static void what_points_say_is_forgotten(void **state)
+{
+    (void)state;
+    scene s, before;
+    assert_ok(scene_load(tiny, NULL, &s, NULL));
+    assert_ok(scene_load(tiny, NULL, &before, NULL));
+    assert_true(s.views[0].nearest > 0 && s.views[0].seen_count > 0);
+    assert_ok(scene_forget_points(&s, true, NULL));
+    size_t at_origin[3] = {0, 0, 0};
+    for (size_t v = 0; v < s.view_count; v++) {
+        assert_true(s.views[v].nearest == 0 && s.views[v].seen_count == 0);
+        for (size_t k = 0; k < 3; k++) {
+            at_origin[k] += s.views[v].camera.center[k] == 0;
+            assert_true(fabs(s.views[v].camera.center[k] + s.origin[k] - before.views[v].camera.center[k] -
+                             before.origin[k]) < 1e-12);
+        }
+    }
+    assert_true(s.points.count == 0 && at_origin[0] > 0 && at_origin[1] > 0 && at_origin[2] > 0);
+    scene_free(&s);
+    scene_free(&before);
+}
+
+/* A camera that turns in the middle of the points: half of them are nearer than what first sizes are a
+   hundredth of, at most. */
+static void sizes_are_of_what_stands_around(void **state)
+{
+    (void)state;
+    scene s;
+    trainer t;
+    const gbt_train_def def = run_def();
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    const double middle[3] = {0, 0, 0}, up[3] = {0.3, 0.5, 0.8};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    for (size_t v = 0; v < VIEWS; v++) {
+        const float *p = s.points.position + 3 * (16 * v);
+        const double target[3] = {(double)p[0], (double)p[1], (double)p[2]};
+        assert_true(gbt_camera_look_at(middle, target, up, &s.views[v].camera));
+    }
+    open_ok(&t, copy_tiny("around", &s, 150, 1, 0), &def);
+    size_t nearer = 0;
+    for (size_t i = 0; i < t.scene.points.count; i++) {
+        const float *p = t.scene.points.position + 3 * i;
+        nearer += sqrt((double)(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])) < 100 * t.first_scale_max;
+    }
+    assert_true(t.scene.points.count == 150 && nearer >= 70 && nearer <= 80);
+    trainer_free(&t);
+    scene_free(&s);
+}
+
+/* Every third anchor is in no picture, and these would be the sample of 1,200: others are asked, in any unit
+   of length. */
+static void distances_are_of_what_photos_show(void **state)
+{
+    (void)state;
+    double distance[2];
+    for (int u = 0; u < 2; u++) {
+        scene s;
+        trainer t;
+        gbt_train_def def = run_def();
+        const scene_split split = {.kind = SCENE_SPLIT_NONE};
+        assert_ok(scene_load(tiny, &split, &s, NULL));
+        assert_int_equal(s.points.count, 150);
+        scene_points many = {.count = POINTS_MOST, .has_color = true};
+        many.position = mem_alloc(POINTS_MOST, 3 * sizeof *many.position, "test", NULL);
+        many.color = mem_alloc(POINTS_MOST, 3 * sizeof *many.color, "test", NULL);
+        for (size_t i = 0; i < 3 * POINTS_MOST; i++) {
+            const bool unseen = i / 3 % 3 == 0 && i % 3 == 2;
+            many.position[i] = s.points.position[i % 450] + 1e-5f * (float)(i / 450) + (unseen ? 1e4f : 0);
+            many.color[i] = s.points.color[i % 450];
+        }
+        mem_free(s.points.position);
+        mem_free(s.points.color);
+        s.points = many;
+        def.init = GBT_INIT_RANDOM;
+        def.init_count = 1;
+        open_ok(&t, copy_tiny(u == 0 ? "thirds" : "large thirds", &s, POINTS_MOST, u == 0 ? 1 : 1024, 0),
+                &def);
+        assert_int_equal(t.anchors.count, POINTS_MOST);
+        distance[u] = t.distance;
+        trainer_free(&t);
+        scene_free(&s);
+    }
+    assert_true(distance[0] < 100 && fabs(distance[1] / distance[0] / 1024 - 1) < 1e-3);
 }
 
 /* ---- units ---- */
@@ -851,6 +955,9 @@ int main(void)
         cmocka_unit_test(nothing_is_nearer_than_photos_show),
         cmocka_unit_test(opacities_are_raised),
         cmocka_unit_test(points_that_tell_nothing_are_replaced),
+        cmocka_unit_test(what_points_say_is_forgotten),
+        cmocka_unit_test(sizes_are_of_what_stands_around),
+        cmocka_unit_test(distances_are_of_what_photos_show),
         cmocka_unit_test(the_unit_of_length_does_not_matter),
         cmocka_unit_test(wild_rates_and_photos_leave_no_nan),
         cmocka_unit_test(exposures_stay_centred),

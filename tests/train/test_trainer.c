@@ -937,9 +937,8 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     if (status != GBT_ERR_IO || strstr(err.text, "last.gbt") == NULL)
         fail_msg("wanted an error of the checkpoint, got %d: %s", (int)status, err.text);
 
-    /* Whole, under its own name or as the previous one; no half-written file beside it. */
-    assert_true((file_exists(last) && is_same_file(last, copy)) ||
-                (!file_exists(last) && is_same_file(in_root("full/checkpoints/last.gbt.prev"), copy)));
+    /* Whole, and under its own name; no half-written file beside it. */
+    assert_true(file_exists(last) && is_same_file(last, copy));
     assert_false(file_exists(in_root("full/checkpoints/.last.gbt.tmp")));
     bytes new_model = read_bytes(in_root("full/model.gbt"));
     assert_int_equal(new_model.count, old_model.count);
@@ -1151,11 +1150,10 @@ static void levels_and_rates(void **state)
             last = level;
         }
         assert_int_equal(schedule_level(1, start), 0);
+        static const double begins[] = {SCHEDULE_WHOLE_FROM, 0.3, 0.15, 0.075};
         for (int level = 0; level < start; level++) {
-            const double begin = schedule_level_start(level, start);
-            assert_true(begin > schedule_level_start(level + 1, start) && begin < 1);
-            assert_int_equal(schedule_level(begin, start), level);
-            assert_int_equal(schedule_level(begin - 1e-9, start), level + 1);
+            assert_int_equal(schedule_level(begins[level] + 1e-9, start), level);
+            assert_int_equal(schedule_level(begins[level] - 1e-9, start), level + 1);
         }
     }
     double before[6];
@@ -1500,6 +1498,7 @@ static void photos_keep_to_their_memory(void **state)
     assert_ok(photos_open(&small, &s, 1, NULL));
     assert_ok(photos_open(&large, &s, 1, NULL));
     small.bytes_max = 2 * 3 * 48 * 36 + 100;
+    small.decoded_max = 1; /* one after another */
     const size_t views[] = {4, 2, 0, 1};
     assert_ok(photos_load(&small, views, 4, NULL));
     image a = {0}, b = {0};
@@ -1513,6 +1512,28 @@ static void photos_keep_to_their_memory(void **state)
             kept += small.full[v] != NULL;
         assert_true(kept <= 3 && small.full[4] != NULL && small.full[2] != NULL);
     }
+    for (size_t i = 0; i < 20; i++) { /* made smaller, they are photos too */
+        const size_t view = i * 7 % VIEWS;
+        assert_ok(photos_get(&small, view, 1, &a, NULL));
+        assert_ok(photos_get(&large, view, 1, &b, NULL));
+        assert_memory_equal(a.pixels, b.pixels, 3 * 24 * 18 * sizeof(float));
+        size_t held = 0;
+        for (size_t v = 0; v < VIEWS; v++)
+            held += (small.full[v] != NULL) * 3 * 48 * 36 + (small.pixels[v] != NULL) * 3 * 24 * 18;
+        assert_true(held <= small.bytes_max + 3 * 48 * 36 + 3 * 24 * 18);
+        assert_true(large.pixels[view] != NULL && large.bytes > large.level_bytes && large.level_bytes > 0);
+    }
+    assert_ok(photos_get(&large, 0, 0, &b, NULL));
+    assert_int_equal(large.bytes, VIEWS * 3 * 48 * 36);
+
+    /* Whether held-out photos can be read does not depend on the memory for those that are kept. */
+    const size_t missing[] = {1, 5};
+    char *path = s.views[5].path;
+    s.views[5].path = (char *)"/nowhere/photo.png";
+    small.bytes_max = 0;
+    assert_int_equal(photos_try(&small, missing, 2, NULL), GBT_ERR_IO);
+    s.views[5].path = path;
+    assert_ok(photos_try(&small, missing, 2, NULL));
     image_free(&a);
     image_free(&b);
     photos_close(&small);

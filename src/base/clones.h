@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/clones.h -- one function in plain C, compiled for several instruction sets; the loader picks the widest
-   that the processor has, whatever GBT_ISA says. */
+/* base/clones.h -- one function in plain C, compiled for several instruction sets; the loader picks.
+
+   The widest that the processor has, whatever GBT_ISA says. */
 #ifndef GBT_BASE_CLONES_H
 #define GBT_BASE_CLONES_H
 

@@ -9,7 +9,7 @@
 #include "raster/raster.h"
 
 enum { TILE = 16 };
-static const double limit_factor = 1.3, radius_sigmas = 3, difference_min = 0.1;
+static const double radius_sigmas = 3, difference_min = 0.1;
 
 screen_view screen_of(const gbt_camera *camera, double near)
 {
@@ -23,9 +23,9 @@ screen_view screen_of(const gbt_camera *camera, double near)
     for (int k = 0; k < 2; k++) {
         s.focal[k] = camera->params[one ? 0 : k];
         s.principal[k] = camera->params[one ? 1 + k : 2 + k] - 0.5;
-        s.limit[k] = limit_factor * side[k] / (2 * s.focal[k]);
         s.tiles[k] = (side[k] + TILE - 1) / TILE;
     }
+    raster_limits(camera, s.low, s.high);
     return s;
 }
 
@@ -33,7 +33,7 @@ screen_view screen_of(const gbt_camera *camera, double near)
    the image. */
 static void project_axis(const screen_view *s, int k, const double t[3], const double axes[9], double row[3])
 {
-    const double ratio = fmax(-s->limit[k], fmin(s->limit[k], t[k] / t[2])), scale = s->focal[k] / t[2];
+    const double ratio = fmax(s->low[k], fmin(s->high[k], t[k] / t[2])), scale = s->focal[k] / t[2];
     for (int i = 0; i < 3; i++)
         row[i] = scale * (axes[3 * k + i] - ratio * axes[6 + i]);
 }

@@ -11,7 +11,7 @@
 typedef struct screen_view {
     double rotation[9], center[3], near;
     double focal[2], principal[2]; /* px; the middle of the first pixel is 0 */
-    double limit[2];               /* of x / z and y / z in the Jacobian */
+    double low[2], high[2];        /* raster_limits() */
     int tiles[2];
 } screen_view;
 

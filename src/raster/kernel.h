@@ -28,8 +28,7 @@ typedef struct raster_view {
     double rotation[9],
         center[3];          /* world to camera; the centre as float32 has it, where the tracer's rays start */
     double fx, fy, cx, cy;  /* cx, cy: from the centre of the first pixel */
-    double low[2], high[2]; /* x / z and y / z are kept between these in the projection's Jacobian: the
-                               picture and 0.15 of it on each side */
+    double low[2], high[2]; /* raster_limits() */
     int width, height, tiles_across, tiles_down;
 } raster_view;
 

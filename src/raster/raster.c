@@ -74,6 +74,18 @@ bool raster_takes(const gbt_camera *camera)
            camera_is_still(camera);
 }
 
+void raster_limits(const gbt_camera *camera, double low[2], double high[2])
+{
+    const int side[2] = {camera->width, camera->height};
+    const bool one_focal = camera->model == GBT_CAMERA_SIMPLE_PINHOLE;
+    for (int k = 0; k < 2; k++) {
+        const double focal = camera->params[one_focal ? 0 : k],
+                     principal = camera->params[k + (one_focal ? 1 : 2)];
+        low[k] = (-0.15 * side[k] - principal) / focal;
+        high[k] = (1.15 * side[k] - principal) / focal;
+    }
+}
+
 static gbt_status make_view(const gbt_camera *camera, const raster_settings *settings, raster_view *out,
                             gbt_error *err)
 {
@@ -103,12 +115,7 @@ static gbt_status make_view(const gbt_camera *camera, const raster_settings *set
                          "raster: a camera of %d x %d pixels, focal lengths %g and %g (wanted 1 to %d "
                          "pixels, lengths > 0, a finite pose)",
                          out->width, out->height, out->fx, out->fy, side_limit);
-    const double side[2] = {out->width, out->height}, focal[2] = {out->fx, out->fy},
-                 principal[2] = {out->cx + 0.5, out->cy + 0.5};
-    for (int k = 0; k < 2; k++) {
-        out->low[k] = -(principal[k] + 0.15 * side[k]) / focal[k];
-        out->high[k] = (1.15 * side[k] - principal[k]) / focal[k];
-    }
+    raster_limits(camera, out->low, out->high);
     out->tiles_across = (out->width + TILE_PIXELS - 1) / TILE_PIXELS;
     out->tiles_down = (out->height + TILE_PIXELS - 1) / TILE_PIXELS;
     return GBT_OK;

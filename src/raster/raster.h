@@ -54,6 +54,10 @@ typedef struct raster_scene {
 /** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE, standing still. */
 bool raster_takes(const gbt_camera *camera);
 
+/** EWA: what x / z and y / z of a centre are kept within in the projection's Jacobian, the picture and 0.15
+   of it on each side. `camera`: one that raster_takes(). */
+void raster_limits(const gbt_camera *camera, double low[2], double high[2]);
+
 /**
  * Draw `g` as `camera` sees it.
  *

@@ -164,7 +164,7 @@ static json_t *way_to_json(const measured *m, size_t way)
 static gbt_status save_figures(const measured *m, gbt_error *err)
 {
     const trace_settings *s = &m->scene->settings;
-    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f}", "schema", 2, "model",
+    json_t *root = json_pack("{s:i,s:o,s:I,s:I,s:i,s:f,s:f,s:f}", "schema", 3, "model",
                              json_text(m->def->model), "rays", (json_int_t)ray_image_count(&m->scene->rays),
                              "gaussians", (json_int_t)m->scene->gaussians->count, "threads",
                              parallel_threads(), "alpha_min", (double)s->alpha_min, "alpha_max",

@@ -115,7 +115,7 @@ static const char tail[] =
     ".TP\n4\ninput or output failed\n"
     ".TP\n5\nout of memory, or over a limit\n"
     ".TP\n130\nstopped by SIGINT or SIGTERM, after saving; a signal\n.I n\nmore than a second "
-    "after the first ends at once, with 128+\\fIn\\fR\n"
+    "after the first ends the process at once: 128+\\fIn\\fR in a shell\n"
     ".TP\n141\nwho read the output has left\n"
     ".SH EXAMPLES\n"
     ".nf\n"

@@ -159,9 +159,8 @@ static double median_distance(const gbt_camera *cameras, size_t count, const dou
     return median(scratch, count);
 }
 
-/** From `middle`; 0 without points. */
-static double median_point_distance(const float *points, size_t count, const double middle[3],
-                                    double *scratch)
+/** From `middle` to the nearest tenth of the points: backgrounds may be far. 0 without points. */
+static double near_point_distance(const float *points, size_t count, const double middle[3], double *scratch)
 {
     for (size_t i = 0; i < count; i++) {
         double way[3];
@@ -169,7 +168,10 @@ static double median_point_distance(const float *points, size_t count, const dou
             way[k] = (double)points[3 * i + (size_t)k] - middle[k];
         scratch[i] = dvec_length(way);
     }
-    return count > 0 ? median(scratch, count) : 0;
+    if (count == 0)
+        return 0;
+    median(scratch, count); /* sorts */
+    return scratch[count / 10];
 }
 
 gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count,
@@ -182,7 +184,7 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
     memset(out, 0, sizeof *out);
     mean_center(cameras, count, middle);
     find_up(cameras, count, middle, out->up);
-    const double far = median_point_distance(points, point_count, middle, scratch),
+    const double far = near_point_distance(points, point_count, middle, scratch),
                  least = fmax(on_the_spot_share * far, 1e-12);
     if (!(nearest_to_axes(cameras, count, middle, out->focus) &&
           median_distance(cameras, count, out->focus, scratch) > least) &&

@@ -21,6 +21,7 @@
 #include "train/pose_file.h"
 #include "train/rules.h"
 #include "train/run_split.h"
+#include "train/seen_points.h"
 
 /* What a result folder says beside its Gaussians: the data set, and what is behind them. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
@@ -216,6 +217,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
     GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
+    if (!seen_points_tell(&out->scene)) /* as in training */
+        GBT_TRY(scene_forget_points(&out->scene, false, err));
     scene_set_alpha(&out->scene, out->def.alpha);
     if (out->def.refine_poses && (data == NULL || file_is_same(data, out->data.place)))
         GBT_TRY(take_refined_poses(out, err));

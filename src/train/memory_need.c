@@ -40,9 +40,9 @@ memory_need memory_need_of(const scene *s, double downscale)
         starting = need.points + need.photos + fmax(need.decoding, need.trees),
                  stepping = need.points + need.photos + need.anchors + fmax(need.view, decoded);
     need.whole = fmax(need.program + fmax(scoring, fmax(starting, stepping)), least_bytes);
-    /* Nothing is let go of while a photo is decoded, and photos that are kept take a quarter of the limit. */
-    const double stays = fmax(fmax(tree_fixed_bytes * points, need.view), 5.0 / 4 * decoded);
-    need.least = fmin(need.whole, 16.0 / 15 * (need.program + stays));
-    need.least = fmax(need.least, least_bytes);
+    need.least = fmin(need.whole, 16.0 / 15 * (need.program + fmax(tree_fixed_bytes * points, need.view)));
+    /* Memory is let go of down to 5/8 of the limit (base/paged.h), not while a photo is decoded. */
+    need.least = fmax(need.least, fmax(8.0 / 3 * decoded, least_bytes));
+    need.whole = fmax(need.whole, need.least);
     return need;
 }

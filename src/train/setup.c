@@ -80,15 +80,15 @@ static void mean_color(const scene_points *points, float color[3])
         color[c] = (float)(sum[c] / (double)points->count);
 }
 
-/* From a camera to the points: the median over a sample of them. */
+/* From a camera to the points in its picture: the median over a sample of them; 0 without any. */
 static double middle_distance(const gbt_camera *camera, const scene_points *points)
 {
     float distances[512];
     size_t count = 0;
     for (size_t i = 0; i < points->count; i += points->count / 512 + 1) {
         double distance;
-        camera_sees(camera, points->position + 3 * i, &distance);
-        distances[count++] = (float)distance;
+        if (camera_sees(camera, points->position + 3 * i, &distance))
+            distances[count++] = (float)distance;
     }
     qsort(distances, count, sizeof *distances, compare_floats);
     return count > 0 ? (double)distances[count / 2] : 0;

@@ -10,36 +10,15 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/photo_check.h"
-#include "train/camera_sees.h"
 #include "train/checkpoint.h"
 #include "train/exposure_spread.h"
 #include "train/memory_need.h"
 #include "train/seed_points.h"
+#include "train/seen_points.h"
 
 enum { FEW_PLACES = 128 };
 
 /* ---- points ---- */
-
-/* Every n-th point first: those that are listed one after another often lie in one place. */
-static bool sees_a_point(const gbt_camera *camera, const scene_points *points)
-{
-    const size_t stride = points->count / 512 + 1;
-    for (size_t first = 0; first < stride; first++)
-        for (size_t i = first; i < points->count; i += stride)
-            if (camera_sees(camera, points->position + 3 * i, NULL))
-                return true;
-    return false;
-}
-
-/* Training photos that see a point; half of them are enough. Points that most photos do not see say nothing
-   about what to render: they may be in another coordinate system, with a few of them in view by chance. */
-static size_t count_seeing(const trainer *t)
-{
-    size_t seeing = 0;
-    for (size_t v = 0; v < t->train_count && 2 * seeing < t->train_count; v++)
-        seeing += sees_a_point(&t->scene.views[t->train_views[v]].camera, &t->scene.points);
-    return seeing;
-}
 
 static int compare_points(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(float)); }
 
@@ -79,8 +58,7 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
 {
     scene_points *points = &t->scene.points, made = {0};
     size_t places = 0;
-    const size_t seeing = count_seeing(t);
-    const bool blind = 2 * seeing < t->train_count;
+    const bool blind = !seen_points_tell(&t->scene);
     if (!blind)
         GBT_TRY(count_places(points, FEW_PLACES, &places, err));
     const bool few = places < FEW_PLACES && t->rules.adds_to_few_points;
@@ -89,9 +67,10 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     if (!blind && !few)
         return GBT_OK;
     if (blind && points->count > 0)
-        log_warn("%s: %zu of %zu training photos see no sparse point, and none is used: are points and poses "
-                 "in one coordinate system?",
-                 t->scene.folder, t->train_count - seeing, t->train_count);
+        log_warn(
+            "%s: most training photos see no sparse point, and none is used: are points and poses in one "
+            "coordinate system?",
+            t->scene.folder);
     if (blind)
         GBT_TRY(scene_forget_points(&t->scene, t->rules.recentres, err));
     gbt_error why = {0};

@@ -80,6 +80,30 @@ static void a_later_signal_ends_the_process(void **state)
     assert_true(WIFSIGNALED(ended) && WTERMSIG(ended) == SIGINT);
 }
 
+static volatile sig_atomic_t of_the_host;
+static void host_handles(int number) { of_the_host = number; }
+
+/* To the handler of the program that the library is in, such as Python's. */
+static void a_later_signal_goes_to_the_host(void **state)
+{
+    (void)state;
+    const pid_t process = fork();
+    assert_true(process >= 0);
+    if (process == 0) {
+        signal(SIGINT, host_handles);
+        stop_signal_catch();
+        raise(SIGINT);
+        const bool kept = of_the_host == 0;
+        usleep(1100000);
+        raise(SIGINT);
+        _exit(kept && of_the_host == SIGINT ? 7 : 8);
+    }
+    int ended = 0;
+    assert_int_equal(waitpid(process, &ended, 0), process);
+    assert_true(WIFEXITED(ended));
+    assert_int_equal(WEXITSTATUS(ended), 7);
+}
+
 static void first_cause_wins(void **state)
 {
     (void)state;
@@ -754,6 +778,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(signals_have_their_handlers_back),
         cmocka_unit_test(a_later_signal_ends_the_process),
+        cmocka_unit_test(a_later_signal_goes_to_the_host),
         cmocka_unit_test(a_shell_takes_a_text_for_one_word),
         cmocka_unit_test(a_rotation_has_nine_numbers),
         cmocka_unit_test(first_cause_wins),

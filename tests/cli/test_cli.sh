@@ -363,7 +363,7 @@ for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candid
     [ "$(grep -c "\"$name\": [0-9]" one.json)" = 2 ] && [ "$(grep -c "\"$name\": [0-9]" two.json)" = 3 ] # at the top, and once per kernel
     report $? "bench writes $name" "$(cat two.json)"
 done
-[ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
+grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9

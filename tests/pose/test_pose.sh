@@ -180,6 +180,8 @@ END
 PATH=$tools "$program" pose film.mp4 -o lasting --progress json >out 2>err
 [ $? = 4 ] && grep -q ': 100 of 100 frames chosen, ' err && [ "$(grep -c '"stage": "frames, measuring"' err)" -lt 50 ]
 report $? "a film that does not say how long it is: three a second all the same" "$(cat err)"
+echo more >>film.mp4
+says "another film of the same name" 2 "^error: lasting: was begun with other photos or options" pose film.mp4 -o lasting
 rm tools/ffmpeg
 if command -v ffmpeg >/dev/null; then
     ffmpeg -hide_banner -loglevel error -y -f lavfi -i testsrc=size=320x240:rate=25:duration=4 "a film.mp4" </dev/null

@@ -3,7 +3,6 @@ include(CMakePackageConfigHelpers)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/gbtrace)
 
 install(TARGETS gbtrace RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS gbtrace_library ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS gbtrace_shared EXPORT gbtrace LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/gbtrace DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
@@ -14,7 +13,7 @@ install(EXPORT gbtrace NAMESPACE gbtrace:: FILE gbtraceConfig.cmake DESTINATION 
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${package_folder})
 
-# pkg-config gbtrace, and --static: our archive on the shared libraries of others. Paths are found from the file's own place, so the tree can be moved.
+# pkg-config gbtrace. Paths are found from the file's own place, so the tree can be moved.
 file(RELATIVE_PATH GBT_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
 configure_file(cmake/gbtrace.pc.in ${CMAKE_BINARY_DIR}/gbtrace.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/gbtrace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)

@@ -1,4 +1,4 @@
-# libgbtrace, static and shared: all rooms in one file, for programs that include gbtrace/*.h.
+# libgbtrace: all rooms in one file. Static for the program and tests of this build; shared for programs that include gbtrace/*.h, the one that is installed.
 get_property(rooms GLOBAL PROPERTY GBT_ROOMS)
 set(library_objects "")
 set(library_links "")

@@ -21,7 +21,7 @@ typedef enum gbt_status {
 } gbt_status;
 
 /** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err =
-    {0};`. */
+    {0};`, in C++ from `gbt_error err = {};`. */
 typedef struct gbt_error {
     gbt_status status;
     char text[512]; /* one line, no newline: "FILE[:LINE|@OFFSET]: what was wrong (wanted, got)" */

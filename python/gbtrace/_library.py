@@ -3,6 +3,7 @@
 
 import ctypes as c
 import os
+from operator import index
 from pathlib import Path
 
 
@@ -144,7 +145,7 @@ def _load():
     try:
         library = c.CDLL(path)
     except OSError as error:
-        raise ImportError(f"libgbtrace: {error} (wanted the library of this package, or its path in GBTRACE_LIBRARY)") from None
+        raise ImportError(f"libgbtrace: {error} (wanted gbtrace's Debian package, or the path of libgbtrace.so in GBTRACE_LIBRARY)") from None
     for name, (result, arguments) in FUNCTIONS.items():
         function = getattr(library, name, None)
         if function is None:
@@ -210,6 +211,13 @@ def version():
     return library.gbt_version().decode()
 
 
+def whole_number(value, name, least):
+    """As C's int, which ctypes would take modulo 2^32."""
+    if not least <= index(value) < 2**31:
+        raise ValueError(f"{name}: {value} (wanted {least} to {2**31 - 1})")
+    return index(value)
+
+
 def set_threads(threads):
     """Threads for everything that follows, at least 1; without this, all processors of this process."""
-    library.gbt_set_threads(int(threads))
+    library.gbt_set_threads(whole_number(threads, "threads", 1))

@@ -3,11 +3,10 @@
 
 import ctypes as c
 import math
-from operator import index
 
 import numpy as np
 
-from gbtrace._library import ArgumentError, CCamera, library, wanted
+from gbtrace._library import ArgumentError, CCamera, library, wanted, whole_number
 
 MODELS = {library.gbt_camera_model_name(i).decode(): i for i in map(library.gbt_camera_model_at, range(library.gbt_camera_model_count()))}
 
@@ -31,7 +30,7 @@ class Camera:
         if len(params) != count:
             names = library.gbt_camera_param_names(MODELS[model]).decode()
             raise ValueError(f"params: {len(params)} (wanted {count} for {model}: {names})")
-        self._c = CCamera(MODELS[model], _pixels(width, "width", 0), _pixels(height, "height", 0))
+        self._c = CCamera(MODELS[model], whole_number(width, "width", 0), whole_number(height, "height", 0))
         self.params[:] = params
         self.rotation[:] = np.eye(3) if rotation is None else rotation
         self.center[:] = center
@@ -115,7 +114,7 @@ class Camera:
 
     def resized(self, width, height):
         """The same camera for a picture of another size."""
-        return Camera._of(library.gbt_camera_resized(c.byref(self._c), _pixels(width, "width", 1), _pixels(height, "height", 1)))
+        return Camera._of(library.gbt_camera_resized(c.byref(self._c), whole_number(width, "width", 1), whole_number(height, "height", 1)))
 
     def distance(self, other):
         """How far apart two poses are: between the centres, and the angle in radians."""
@@ -125,13 +124,6 @@ class Camera:
 
     def __repr__(self):
         return f"Camera({self.model!r}, {self.width}, {self.height}, params={self.params.tolist()}, center={self.center.tolist()})"
-
-
-def _pixels(count, name, least):
-    """A side of a picture as C's int, which would take any number, modulo 2^32."""
-    if not least <= index(count) < 2**31:
-        raise ValueError(f"{name}: {count} (wanted {least} to {2**31 - 1})")
-    return index(count)
 
 
 def _doubles(values, count):

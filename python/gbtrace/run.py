@@ -50,7 +50,9 @@ def evaluate(run, data=None, lpips=None, json=None):
 def export(path, *outputs, sh_degree=3, refine_steps=500, gaussians=0, backdrop=True, data=None):
     """Write a trained model, or plain Gaussians, as plain Gaussians, in the format of each name's ending (docs/exporting.md)."""
     settings = lib.library.gbt_export_def_default()
-    settings.sh_degree, settings.refine_steps, settings.gaussians, settings.backdrop = sh_degree, refine_steps, gaussians, backdrop
+    settings.sh_degree = lib.whole_number(sh_degree, "sh_degree", 0)
+    settings.refine_steps = lib.whole_number(refine_steps, "refine_steps", 0)
+    settings.gaussians, settings.backdrop = lib.whole_number(gaussians, "gaussians", 0), backdrop
     settings.data = lib.optional(data)
     names = (c.c_char_p * len(outputs))(*(lib.encode(name) for name in outputs))
     lib.call("gbt_export", lib.encode(path), c.byref(settings), names, len(outputs), None)

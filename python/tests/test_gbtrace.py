@@ -170,6 +170,11 @@ class Cameras(unittest.TestCase):
         self.assertEqual(a_camera().resized(np.int64(20), 15).width, 20)
         with self.assertRaisesRegex(ValueError, "target"):
             a_camera().looking_at((0, 0, 0), (0, 0, 0))
+        with self.assertRaisesRegex(ValueError, "gaussians: 4294967296"):
+            gbtrace.export("RUN", "scene.ply", gaussians=2**32)
+        for threads in (0, 2**32):
+            with self.assertRaisesRegex(ValueError, f"threads: {threads} .wanted 1 to"):
+                gbtrace.set_threads(threads)
 
 
 class Trained(unittest.TestCase):

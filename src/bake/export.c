@@ -16,6 +16,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
 #include "image/metrics.h"
@@ -460,6 +461,7 @@ static void exporting_free(exporting *e)
 gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs,
                       size_t output_count, FILE *report, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(def_check(def->cookie_, "gbt_export_def_default", err));
     GBT_TRY(check(input, def, outputs, output_count, err));
     exporting *e = mem_calloc(1, sizeof *e, "export", err);

@@ -5,8 +5,11 @@
 #include <signal.h>
 #include <stddef.h>
 
+#include "base/plain_numbers.h"
+
 static void *run_job(void *context)
 {
+    PLAIN_NUMBERS; /* a thread begins with the program's locale */
     beside *b = context;
     b->run(b->context);
     atomic_store(&b->over, true);

@@ -31,7 +31,7 @@ gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *
  * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel, and the colours
  * as the file has them: times alpha in an EXR, not so in a PNG. The format is taken from the file's magic,
  * not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, deep or multi-part EXR,
- * and images of more than 2^28 samples are refused. Float values that are not finite become 0, with one
+ * and images of more than 2^29 samples are refused. Float values that are not finite become 0, with one
  * warning.
  *
  * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure

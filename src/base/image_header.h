@@ -15,7 +15,7 @@ extern "C" {
 typedef enum image_kind { IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR } image_kind;
 
 /** Largest width * height * channels that is read. */
-#define IMAGE_SAMPLES_MAX (INT64_C(1) << 28)
+#define IMAGE_SAMPLES_MAX (INT64_C(1) << 29)
 
 /** The same for people. */
 #define IMAGE_MEGAPIXELS_MAX(channels) (1e-6 * (double)IMAGE_SAMPLES_MAX / ((channels) > 1 ? (channels) : 1))

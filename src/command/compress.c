@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "data/json_out.h"
@@ -261,6 +262,7 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err)
 {
+    PLAIN_NUMBERS;
     stop_signal_catch();
     const gbt_status status =
         cluster_follow(cluster_leads() ? compress(run, def, out, report, err) : GBT_OK, err);

@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "data/json_out.h"
@@ -90,6 +91,7 @@ static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded
 
 gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(def_check(def->cookie_, "gbt_evaluate_def_default", err));
     if (!file_is_folder(run))
         return base_fail(err, GBT_ERR_IO, "%s: not a run folder (wanted what gbtrace train wrote)", run);

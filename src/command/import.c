@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "data/result_folder.h"
 #include "data/scene.h"
 #include "frame/frame.h"
@@ -112,6 +113,7 @@ static gbt_status write_run(const model *m, const char *run, gbt_error *err)
 gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report,
                       gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(def_check(def->cookie_, "gbt_import_def_default", err));
     GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
     GBT_TRY(check_places(run, def, err));

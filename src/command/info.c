@@ -13,6 +13,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/plain_numbers.h"
 #include "cells/draw.h"
 #include "command/expect.h"
 #include "data/gaussian_file.h"
@@ -260,6 +261,7 @@ static bool is_model_name(const char *path)
 
 gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     char inside[4096];
     if (file_is_folder(path)) {
         GBT_TRY(file_join(inside, sizeof inside, path, "model.gbt", err));

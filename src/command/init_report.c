@@ -17,6 +17,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "bvh/points.h"
 #include "data/json_out.h"
 #include "data/ply.h"
@@ -314,6 +315,7 @@ static gbt_status check_def(const gbt_init_def *def, gbt_error *err)
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,
                     FILE *report, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     anchor_init_def how = anchor_init_def_default();
     GBT_TRY(check_def(def, err));
     if (file_is_same(data, out_ply) ||

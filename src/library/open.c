@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "library/handle.h"
 
 static gbt_status make(gbt_model **out, gbt_error *err)
@@ -27,6 +28,7 @@ static gbt_status opened(gbt_model *m, gbt_status status, gbt_model **out)
 
 gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     gbt_model *m;
     *out = NULL;
     GBT_TRY(make(&m, err));
@@ -217,6 +219,7 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
 
 gbt_status gbt_model_open_views(gbt_model *m, const char *data, size_t *count, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     *count = 0;
     loaded_run_close_views(&m->run);
     if (data == NULL && m->path[0] == '\0')

@@ -15,6 +15,7 @@
 #include "base/def.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "data/bytes.h"
 #include "data/unposed.h"
@@ -234,6 +235,7 @@ static gbt_status run(job *j, FILE *report, gbt_error *err)
 gbt_status gbt_pose(const char *source, const gbt_pose_def *def, const char *data, FILE *report,
                     gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(check(def, err));
     job *j = mem_calloc(1, sizeof *j, "pose", err);
     if (j == NULL)

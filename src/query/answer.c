@@ -7,6 +7,7 @@
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "data/number.h"
 #include "gbtrace/query.h"
 #include "query/rows.h"
@@ -144,6 +145,7 @@ static gbt_status answer(const gbt_balls *balls, const gbt_query_def *def, const
 
 gbt_status gbt_query(const char *path, const gbt_query_def *def, FILE *out, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(check(def, err));
     query_rows rows = {0};
     gbt_balls *balls = NULL;

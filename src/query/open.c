@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "data/gaussian_file.h"
 #include "data/scene.h"
 #include "query/handle.h"
@@ -153,6 +154,7 @@ static gbt_status finish(gbt_balls *b, const char *path, gbt_status status, gbt_
 
 gbt_status gbt_balls_open(const char *path, gbt_balls **out, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     *out = NULL;
     gbt_balls *b = mem_calloc(1, sizeof *b, "balls", err);
     if (b == NULL)

@@ -11,6 +11,7 @@
 #include "base/image_header.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "cluster/cluster.h"
 #include "gbtrace/evaluate.h"
 #include "render/camera_file.h"
@@ -403,6 +404,7 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
 
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     GBT_TRY(check_def(out, def, err));
     GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_make_folder(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);

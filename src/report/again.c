@@ -8,6 +8,7 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "data/json_fields.h"
 #include "gbtrace/evaluate.h"
 #include "report/metrics.h"
@@ -60,6 +61,7 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
 
 gbt_status gbt_report(const char *run, const char *const *studies, size_t study_count, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     char path[4096];
     json_t *metrics = NULL;
     evaluation e = {0};

@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "base/paged.h"
 #include "base/parallel.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "base/vec.h"
 #include "cluster/cluster.h"
@@ -293,6 +294,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
 
 gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     trainer *t = mem_calloc(1, sizeof *t, "trainer", err);
     config_strings *strings = mem_calloc(1, sizeof *strings, "settings", err);
     stop_signal_catch();
@@ -308,6 +310,7 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
 
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     gbt_train_def def = gbt_train_def_default();
     config_strings strings;
     GBT_TRY(config_parse(settings, "settings", &def, &strings, err));

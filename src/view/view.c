@@ -6,6 +6,7 @@
 #include "base/def.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "view/server.h"
 #include "view/studio.h"
@@ -48,6 +49,7 @@ static void serve_until_signal(studio *s, server *http, const char *url, const g
 
 gbt_status gbt_view(const char *input, const gbt_view_def *def, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     server *http = NULL;
     guard who;
     char url[GUARD_URL_SIZE];

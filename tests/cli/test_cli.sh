@@ -300,8 +300,8 @@ done
 misuse 2 "--radius: bad value (wanted a number from 0 to 1e+09, got -1)" render tiny -o o --path orbit --radius -1
 misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o --frames 3
 misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
-printf '{"model": "equirectangular", "width": 16384, "height": 8192, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
-misuse 2 "large: a picture of 16384 x 8192 pixels (wanted at most 89478485 pixels)" render tiny -o o --camera large.json
+printf '{"model": "equirectangular", "width": 16384, "height": 16384, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
+misuse 2 "large: a picture of 16384 x 16384 pixels (wanted at most 178956970 pixels)" render tiny -o o --camera large.json
 misuse 2 "film.MOV: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2

@@ -18,7 +18,6 @@ has() { awk -v wanted="$1" '$6 ~ "^\\./usr/" wanted "$" { found = 1 } END { exit
 check "the program" has bin/gbtrace
 check "the library by its version" has 'lib/.*libgbtrace\.so\.[0-9.]+'
 check "the library by its name" has 'lib/.*libgbtrace\.so'
-check "the static library" has 'lib/.*libgbtrace\.a'
 check "headers" has include/gbtrace/model.h
 check "pkg-config" has 'lib/.*pkgconfig/gbtrace\.pc'
 check "CMake" has 'lib/.*cmake/gbtrace/gbtraceConfig\.cmake'

@@ -45,15 +45,10 @@ by_pkg_config() {
             -Wl,-rpath,"$folder" || return 1
     done
 }
-by_pkg_config_static() {
-    cc -std=c11 $(pkg-config --cflags gbtrace) "$source/examples/render.c" -o "$work/render_static" \
-        $(pkg-config --static --libs gbtrace | sed "s,-lgbtrace,$folder/libgbtrace.a,") && ! ldd "$work/render_static" | grep -q libgbtrace
-}
 by_cmake() {
     cmake -G Ninja -S "$source/examples" -B "$work/by_cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release && cmake --build "$work/by_cmake"
 }
 check "examples by pkg-config" by_pkg_config
-check "an example on the static library" by_pkg_config_static
 check "examples by CMake" by_cmake
 check "the version that pkg-config says" test "$(pkg-config --modversion gbtrace)" = "$("$prefix/bin/gbtrace" --version | sed 's/gbtrace //')"
 
@@ -62,7 +57,6 @@ check "make-scene" "$prefix/bin/gbtrace" make-scene tabletop -o "$work/data" --w
 check "example train" "$work/by_cmake/train" "$work/data" "$work/run" 150
 check "example render" "$work/by_cmake/render" "$work/run" "$work/view.ppm" 1
 check "the picture has its size" test "$(head -c 9 "$work/view.ppm" | tr '\n' ' ')" = "P6 64 48 "
-check "the static one draws the same" sh -c "'$work/render_static' '$work/run' '$work/other.ppm' 1 && cmp '$work/view.ppm' '$work/other.ppm'"
 check "example render says what is missing" sh -c "! '$work/render' '$work/none' '$work/x.ppm' 2>'$work/said' && grep -q '^error: .*none' '$work/said'"
 check "example pose" sh -c "'$work/pose' '$work/run' >'$work/pose.txt'"
 check "the pose is found" awk '/^before/ { d = $2; a = $5 } /^after/ { ok = $2 < 0.01 * d && $5 < 0.01 * a } END { exit !ok }' "$work/pose.txt"

@@ -6,6 +6,7 @@
 #include "run_support.h"
 
 #include <jansson.h>
+#include <locale.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -332,6 +333,27 @@ static void a_budget_run_can_be_repeated(void **state)
     json_t *repeated = read_summary(in_root("pace"));
     assert_int_equal(json_integer_value(json_object_get(repeated, "iterations")), sum);
     json_decref(repeated);
+}
+
+/* A program with a decimal comma, such as a German one with GTK, writes and reads the same files. */
+static void a_decimal_comma_changes_no_file(void **state)
+{
+    (void)state;
+    char command[PATH_SIZE + 100];
+    gbt_train_def def = run_def();
+    straight_run();
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, in_root("comma"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 '%s' >/dev/null 2>&1",
+             in_root("de_DE.UTF-8"));
+    if (system(command) != 0 || setenv("LOCPATH", in_root("."), 1) != 0 ||
+        setlocale(LC_ALL, "de_DE.UTF-8") == NULL)
+        skip();
+    resume_ok(in_root("comma"));
+    setlocale(LC_ALL, "C");
+    unsetenv("LOCPATH");
+    assert_same_file(straight_run(), in_root("comma/model.gbt"));
+    assert_same_file(in_root("straight/config"), in_root("comma/config"));
 }
 
 /* Steps take a time of their own, most of it in reading photos, and one per pixel, twice that where rays are
@@ -1762,6 +1784,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(more_memory_than_allowed),
         cmocka_unit_test(another_seed_changes_bits),
         cmocka_unit_test(a_budget_run_can_be_repeated),
+        cmocka_unit_test(a_decimal_comma_changes_no_file),
         cmocka_unit_test(a_budget_gives_its_parts_equal_times),
         cmocka_unit_test(a_budget_run_resumes_its_clock),
         cmocka_unit_test(training_learns),

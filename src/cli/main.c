@@ -65,8 +65,9 @@ static int run(const command *self, int argc, char **argv)
         return 0;
     gbt_error err = {0};
     const char *folder = getenv("TMPDIR");
-    if (options_memory > 0 && /* not /tmp, which may be memory itself */
-        gbt_set_memory(options_memory, folder != NULL && folder[0] != '\0' ? folder : "/var/tmp", &err) != GBT_OK)
+    if (folder == NULL || folder[0] == '\0')
+        folder = "/var/tmp"; /* not /tmp, which may be memory itself */
+    if (options_memory > 0 && gbt_set_memory(options_memory, folder, &err) != GBT_OK)
         return command_failed(err.status, &err);
     const int done = self->run(&given);
     return done == 0 ? command_failed(options_memory_kept(options_memory, &err), &err) : done;

@@ -243,13 +243,20 @@ static void add_view(text *out, const map *m, const scene_view *view, const eval
     text_add(out, is_scored ? "</a>" : "");
 }
 
+/** One in so many of the training cameras is shown. */
+static size_t step_of_cameras(const loaded_run *r)
+{
+    return (r->scene.view_count + CAMERAS_MAX - 1) / CAMERAS_MAX;
+}
+
 /** Held-out ones last, above the others. */
 static void add_cameras(text *out, const map *m, const loaded_run *r, const evaluation *e)
 {
-    const size_t step = (r->scene.view_count + CAMERAS_MAX - 1) / CAMERAS_MAX;
+    const size_t step = step_of_cameras(r);
+    size_t trained = 0; /* counted by themselves: every eighth view is held out */
     for (int held = 0; held < 2; held++)
         for (size_t i = 0; i < r->scene.view_count; i++)
-            if (r->scene.views[i].is_test == (held > 0) && (held > 0 || i % step == 0))
+            if (r->scene.views[i].is_test == (held > 0) && (held > 0 || trained++ % step == 0))
                 add_view(out, m, &r->scene.views[i], e);
 }
 
@@ -282,7 +289,10 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
                     "class=\"key block train\">",
                     m->title);
         text_count(out, (double)(r->scene.view_count - held));
-        text_add(out, " trained on</span><span class=\"key block held\">");
+        text_add(out, " trained on");
+        if (step_of_cameras(r) > 1)
+            text_format(out, ", 1 in %zu shown", step_of_cameras(r));
+        text_add(out, "</span><span class=\"key block held\">");
         text_count(out, (double)held);
         text_add(out, " held out</span><span class=\"key dots dust\">anchors, points in their "
                       "colours</span></p></figcaption>");

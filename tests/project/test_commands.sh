@@ -44,7 +44,7 @@ tr -d '\r' <"$source/README.md" | awk '
             command = substr(line, RSTART + 1, RLENGTH - 2)
             line = substr(line, RSTART + RLENGTH)
             if (command ~ /^--/ && line ~ /^ with render/) print "gbtrace render RUN -o FOLDER " command
-            else if (command ~ /^(gbtrace [a-z]|mpirun |\.\/run |pip |cd )/) print command
+            else if (command ~ /^(gbtrace [a-z]|mpirun |\.\/run |python3 -m |cd )/) print command
         }
     }' >commands
 awk '/^    (\[[0-9:]+\] )?\$ / { sub(/^[^$]*\$ /, ""); command = $0; print; next }

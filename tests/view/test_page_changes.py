@@ -136,6 +136,22 @@ def before_the_first_model(work):
         page.key("keyUp", "KeyW", "w")
 
 
+def another_log(work):
+    """Of another program: without our columns. And one that is too long to be the arguments of a function."""
+    shutil.copytree(work + "/run", work + "/foreign")
+    with open(work + "/foreign/log.csv", "w", encoding="utf-8") as log:
+        log.write("iteration,loss\n1,0.5\n")
+    shutil.copytree(work + "/run", work + "/long")
+    row = log_row(work + "/run")
+    with open(work + "/long/log.csv", "a", encoding="utf-8") as log:
+        log.write(row * 200000)
+    for run, hidden in (("/foreign", True), ("/long", False)):
+        with opened(work + run) as page:
+            page.wait(STILL)
+            page.wait(f"document.getElementById('training-part').hidden === {str(hidden).lower()}")
+            check(run + ": pictures, and no message", page.run("document.getElementById('message').hidden"), page.run(MESSAGE))
+
+
 def put(file, place):
     """At once, as training does."""
     shutil.copy(file, place + ".new")
@@ -153,6 +169,7 @@ def tests(work):
     other_photos(work)
     other_pixels(work)
     no_photo(work)
+    another_log(work)
     busy(work)
     before_the_first_model(work)
 

@@ -72,6 +72,36 @@ def flying(page):
     page.key("keyUp", "KeyS", "s")
 
 
+def slow(page):
+    """Pictures that take half a second are shown while the camera moves, not thrown away for newer ones."""
+    page.press("KeyF", "f")
+    page.wait(STILL)
+    shown = page.run("""(async () => {
+        const ask = window.fetch, show = gbtrace.pictures.show;
+        let shown = 0;
+        window.fetch = async (...what) => {
+            const response = await ask(...what);
+            await new Promise(done => setTimeout(done, String(what[0]).startsWith('render') ? 500 : 0));
+            return response;
+        };
+        gbtrace.pictures.show = (...what) => { shown++; return show(...what); };
+        const moves = setInterval(() => gbtrace.pictures.change(true), 16);
+        await new Promise(done => setTimeout(done, 4000));
+        clearInterval(moves);
+        window.fetch = ask, gbtrace.pictures.show = show;
+        gbtrace.changed();
+        return shown;
+    })()""")
+    check("slow pictures are shown while the camera moves", shown >= 2, str(shown))
+    page.wait(STILL)
+    page.run("gbtrace.camera.view = -1")
+    far, eye = page.run(TO_SUBJECT), page.run("gbtrace.camera.eye")
+    page.run("""(stage => { for (const way of [-1, 1]) for (let i = 0; i < 400; i++)
+        stage.dispatchEvent(new WheelEvent('wheel', { deltaY: 200 * way, bubbles: true, cancelable: true })); })(document.getElementById('stage'))""")
+    page.wait(STILL)
+    check("the wheel comes back from very near", page.run(TO_SUBJECT) > far / 2, f"{page.run(TO_SUBJECT)}, {far}, {eye}")
+
+
 def fit_and_start(page):
     page.press("KeyH", "h")
     page.wait(f"gbtrace.camera.view >= 0 && {STILL}")
@@ -225,6 +255,7 @@ def tests(work):
     with opened(work + "/run") as page:
         keys_after_clicks(page)
         flying(page)
+        slow(page)
     with opened(work + "/run", dark=True) as page:
         fit_and_start(page)
         lines(page)

@@ -29,7 +29,7 @@ export class Camera {
     }
 
     right() { return unit(cross(this.forward, this.up)); }
-    distance() { return Math.max(length(sub(this.eye, this.pivot)), 1e-6); }
+    distance() { return length(sub(this.eye, this.pivot)) || 1; }
 
     // The pose of a camera file, and a pivot on its axis beside the middle of the scene.
     place(pose, middle) {
@@ -37,7 +37,7 @@ export class Camera {
         this.forward = unit(sub(pose.target, pose.origin));
         this.up = unit(pose.up);
         const far = length(sub(middle, this.eye)), along = dot(sub(middle, this.eye), this.forward);
-        this.pivot = add(this.eye, mul(this.forward, Math.max(along, 0.2 * far, 1e-3)));
+        this.pivot = add(this.eye, mul(this.forward, Math.max(along, 0.2 * far) || 1));
     }
 
     // Turn eye and view as one body about a point.

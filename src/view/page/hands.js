@@ -103,7 +103,11 @@ function listenToKeys(act) {
         act.fly(...way);
     };
     window.addEventListener("keydown", event => {
-        if (isItsOwn(event) || event.ctrlKey || event.metaKey || event.altKey)
+        if (isItsOwn(event) || event.ctrlKey || event.metaKey)
+            return;
+        // By the letter, else by its place where the layout has other letters; [ and ] want Alt on some.
+        const own = act.keys[event.key.toLowerCase()] ?? act.keys[event.code.replace("Key", "").toLowerCase()];
+        if (event.altKey && !"[]".includes(event.key))
             return;
         fast = event.shiftKey;
         if (event.code in keysOf) {
@@ -114,12 +118,14 @@ function listenToKeys(act) {
                 before = performance.now();
                 requestAnimationFrame(fly);
             }
-        } else if (!event.repeat && act.keys[event.key.toLowerCase()] !== undefined) {
-            act.keys[event.key.toLowerCase()]();
+        } else if (!event.repeat && own !== undefined) {
+            own();
         }
     });
     window.addEventListener("keyup", event => {
         held.delete(event.code);
+        if (event.key === "Meta")
+            held.clear(); // macOS tells of no other key that is let go of meanwhile
         fast = event.shiftKey;
     });
     window.addEventListener("blur", () => held.clear());

@@ -13,7 +13,7 @@ export function savePicture(canvas, name) {
 
 // The button says that it is done; where the clipboard is closed the text is shown instead.
 export async function copyText(button, text) {
-    const name = button.textContent;
+    const name = button.dataset.name ??= button.textContent; // not "Copied", of a click before
     try {
         await navigator.clipboard.writeText(text);
         button.textContent = "Copied";

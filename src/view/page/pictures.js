@@ -38,6 +38,7 @@ export class Pictures {
         this.wake = () => {};
         this.asked = new AbortController(); // of the picture that is waited for, since askedAt
         this.askedAt = 0;
+        this.askedStill = false;
         this.run();
     }
 
@@ -45,8 +46,8 @@ export class Pictures {
     change(moving = false) {
         this.generation++;
         this.movedAt = moving ? performance.now() : -1e9;
-        if (performance.now() - this.askedAt > wholeMs)
-            this.asked.abort(); // a long one that nobody wants any more
+        if (this.askedStill && performance.now() - this.askedAt > wholeMs)
+            this.asked.abort(); // a long one that nobody wants any more; small ones come as fast as they can
         this.wake();
     }
 
@@ -80,6 +81,7 @@ export class Pictures {
         query.set("sample", sample);
         this.asked = new AbortController();
         this.askedAt = performance.now();
+        this.askedStill = still;
         const generation = this.generation, answer = ask(query, this.asked.signal, () => generation === this.generation);
         answer.catch(() => {}); // run() tells, when it comes to it
         return { generation, output: want.output, shot: want.shot, scale, still, samples: sample + 1, answer };
@@ -104,7 +106,7 @@ export class Pictures {
                 await this.show(picture, done);
                 picture.about.draw_ms = performance.now() - begin;
             } catch (error) {
-                this.shown = { ...asked, failed: true }; // until something changes
+                this.shown = { ...(asked ?? this.shown), failed: true }; // until something changes
                 if (error.name !== "AbortError")
                     this.fail(error);
                 asked = this.next(this.shown);

@@ -37,5 +37,5 @@ export function findSubject(scene) {
     // Cameras that turned on the spot "meet" where they stand.
     if (2 * seen.length > poses.length && length(sub(middle, scene.center)) < 2 * scene.size && radius > 0.02 * scene.size)
         return { middle, radius };
-    return { middle: scene.center, radius: Math.max(scene.size, 1e-3) };
+    return { middle: scene.center, radius: scene.size || 1 };
 }

@@ -21,14 +21,19 @@ export class Training {
 
     async poll() {
         try {
-            const status = await (await fetch("status")).json();
+            const response = await fetch("status");
+            if (response.status === 403) { // another server, which this page's address does not open
+                if (!this.gone)
+                    this.changed({ version: 0, note: (await response.text()).trim() });
+                this.gone = true;
+                return void setTimeout(() => this.poll(), pollMs);
+            }
+            const status = await response.json();
             const isAnother = this.gone || status.started !== this.started;
             if (isAnother)
                 this.forget(); // a server that was started again may show another run
             this.live.hidden = !(status.log_age >= 0 && status.log_age < liveSeconds);
-            if (status.log_bytes !== this.bytes)
-                await this.readLog();
-            this.describe(status);
+            await this.follow(status).catch(() => this.part.hidden = true); // a log of another program
             if (status.version !== this.version || status.note !== this.note || isAnother) {
                 this.version = status.version, this.note = status.note, this.started = status.started;
                 this.changed(status);
@@ -40,6 +45,12 @@ export class Training {
             this.gone = true;
         }
         setTimeout(() => this.poll(), pollMs);
+    }
+
+    async follow(status) {
+        if (status.log_bytes !== this.bytes)
+            await this.readLog();
+        this.describe(status);
     }
 
     async readLog() {
@@ -78,7 +89,8 @@ export class Training {
         if (rows.length === 0)
             return;
         const values = rows.flatMap(r => r.test_psnr > 0 ? [r.train_psnr, r.test_psnr] : [r.train_psnr]);
-        const low = Math.floor(Math.min(...values)), high = Math.max(low + 1, Math.ceil(Math.max(...values))), last = rows[rows.length - 1].step;
+        const least = values.reduce((a, b) => Math.min(a, b)), most = values.reduce((a, b) => Math.max(a, b));
+        const low = Math.floor(least), high = Math.max(low + 1, Math.ceil(most)), last = rows[rows.length - 1].step;
         const x = step => left + (right - left) * step / last, y = psnr => bottom - (bottom - top) * (psnr - low) / (high - low);
         const put = (kind, attributes, text) => {
             const e = document.createElementNS("http://www.w3.org/2000/svg", kind);

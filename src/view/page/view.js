@@ -201,7 +201,7 @@ function fail(error) {
     byId("message").hidden = false;
 }
 
-const pictures = new Pictures(wanted, show, fail), lines = new Lines(byId("lines"));
+const pictures = new Pictures(wanted, show, error => training.gone || fail(error)), lines = new Lines(byId("lines"));
 
 function showControls() {
     const left = look.view >= 0 && look.noPhoto === "" && chosen("compare") !== "off" && compareMode() === "off", fov = camera.fovOf(...pictureSize());
@@ -428,7 +428,12 @@ listen(byId("stage"), {
     orbit: (x, y) => { camera.orbit(-2 * Math.PI * x, -Math.PI * y, camera.pivot); moved(); },
     around: (x, y) => { camera.orbit(radiansPerPixel() * x, radiansPerPixel() * y, camera.eye); moved(); },
     shift: (x, y) => { camera.move(-x * unitsPerPixel(), y * unitsPerPixel(), 0); moved(); },
-    zoom: factor => { camera.zoom(factor); moved(); },
+    zoom: factor => {
+        const far = camera.distance() / look.subject.radius; // beyond these, rounding would hold it there
+        if (factor > 1 ? far < 1e6 : far > 1e-4)
+            camera.zoom(factor);
+        moved();
+    },
     split: share => { look.split = share; layout(); },
     fly, pick, click: clickAt, point: pointAt, keys,
 }, byId("handle"), byId("render-box"), document.querySelector("aside"));
@@ -461,6 +466,14 @@ for (const id of ["grid", "cameras"])
     });
 byId("speed").addEventListener("input", showControls);
 new ResizeObserver(() => look.subject !== null && changed()).observe(byId("stage"));
+function followPixelRatio() { // another screen, another number of pixels for the same stage
+    matchMedia(`(resolution: ${devicePixelRatio}dppx)`).addEventListener("change", () => {
+        if (look.subject !== null)
+            changed();
+        followPixelRatio();
+    }, { once: true });
+}
+followPixelRatio();
 if (words.get("transfer") === "jpeg")
     byId("transfer").value = "jpeg";
 

@@ -19,12 +19,15 @@ static const double flat_share = 0.2, flat_cosine = 0.7;
 static const double on_the_spot_share = 0.02;
 static const double tan_widest = 2; /* of a lens that no pinhole stands for, 127 degrees */
 
-/** The upper median; sorts. */
-static double median(double *values, size_t count)
+/** Of `count` values the one with `rank` smaller ones; sorts. */
+static double ranked(double *values, size_t count, size_t rank)
 {
     qsort(values, count, sizeof *values, compare_doubles);
-    return values[count / 2];
+    return values[rank];
 }
+
+/** The upper median; sorts. */
+static double median(double *values, size_t count) { return ranked(values, count, count / 2); }
 
 static void mean_center(const gbt_camera *cameras, size_t count, double out[3])
 {
@@ -168,10 +171,7 @@ static double near_point_distance(const float *points, size_t count, const doubl
             way[k] = (double)points[3 * i + (size_t)k] - middle[k];
         scratch[i] = dvec_length(way);
     }
-    if (count == 0)
-        return 0;
-    median(scratch, count); /* sorts */
-    return scratch[count / 10];
+    return count > 0 ? ranked(scratch, count, count / 10) : 0;
 }
 
 gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count,

@@ -81,6 +81,11 @@ train_rules train_rules_of(const gbt_train_def *def)
     return def->compat ? reference_rules() : own_rules(def);
 }
 
+bool train_rules_are_loose(const train_rules *rules, double progress)
+{
+    return rules->loose_rays && progress < SCHEDULE_EXACT_FROM;
+}
+
 double train_rules_progress(const train_rules *rules, const pace *p, uint64_t step)
 {
     return pace_progress(p, rules->counts_from_one ? step + 1 : step);

@@ -78,6 +78,9 @@ typedef struct train_rules {
 /** The rules for these settings: ours, or with `compat` all of the reference. */
 train_rules train_rules_of(const gbt_train_def *def);
 
+/** Does a step trade exactness for speed: cut-offs, and one order for neighbouring rays? */
+bool train_rules_are_loose(const train_rules *rules, double progress);
+
 /** By which the learning rates of a step (0-based) and its growth go. */
 double train_rules_progress(const train_rules *rules, const pace *p, uint64_t step);
 

@@ -26,5 +26,5 @@ step_size step_size_of(const gbt_camera *camera, const train_rules *rules, doubl
 
 double step_hits_per_pixel(const train_rules *rules, double progress)
 {
-    return rules->loose_rays && progress >= SCHEDULE_EXACT_FROM ? 2 : 1;
+    return train_rules_are_loose(rules, progress) ? 1 : 2;
 }

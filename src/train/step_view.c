@@ -182,18 +182,12 @@ gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt
     return frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, adjoint, err);
 }
 
-/* Does the step trade exactness for speed? */
-static bool is_loose(const trainer *t, double progress)
-{
-    return t->rules.loose_rays && progress < SCHEDULE_EXACT_FROM;
-}
-
 static trace_settings settings_of(const trainer *t, const step_view *v, double progress)
 {
     trace_settings settings = t->settings;
     settings.t_near = step_view_near(t, v);
     memcpy(settings.background, v->background, sizeof settings.background);
-    if (is_loose(t, progress)) {
+    if (train_rules_are_loose(&t->rules, progress)) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
         settings.packet_order = true;
@@ -252,7 +246,7 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     frame *f = &v->frame;
     const trace_settings settings = settings_of(t, v, progress);
     f->draw.renderer = renderer_of_step(t, &v->camera, progress);
-    f->draw.one_start = is_loose(t, progress);
+    f->draw.one_start = train_rules_are_loose(&t->rules, progress);
     GBT_TRY(frame_render(f, frame_neural(&t->anchors, &t->decoder), &v->camera, &settings, true, err));
     r->gaussians = f->gaussians.count;
     r->visible = f->visible_count;

@@ -70,37 +70,15 @@ static void skip_where_signals_wait(void)
 #endif
 }
 
-static void a_later_signal_ends_the_process(void **state)
-{
-    (void)state;
-    skip_where_signals_wait();
-    const pid_t process = fork();
-    assert_true(process >= 0);
-    if (process == 0) {
-        signal(SIGINT, SIG_IGN); /* as a shell leaves it to what it starts in the background */
-        stop_signal_catch();
-        raise(SIGINT);
-        usleep(1100000);
-        raise(SIGINT);
-        _exit(0);
-    }
-    int ended = 0;
-    assert_int_equal(waitpid(process, &ended, 0), process);
-    assert_true(WIFSIGNALED(ended) && WTERMSIG(ended) == SIGINT);
-}
-
+/* How a process ends that has this handler of SIGINT, and two of them, one much later, in a loop that stops
+   by signals; 7 if it goes on and the handler was called by the second alone. */
 static volatile sig_atomic_t of_the_host;
-static void host_handles(int number) { of_the_host = number; }
-
-/* To the handler of the program that the library is in, such as Python's. */
-static void a_later_signal_goes_to_the_host(void **state)
+static int end_of_two_signals(void (*handler)(int))
 {
-    (void)state;
-    skip_where_signals_wait();
     const pid_t process = fork();
     assert_true(process >= 0);
     if (process == 0) {
-        signal(SIGINT, host_handles);
+        signal(SIGINT, handler);
         stop_signal_catch();
         raise(SIGINT);
         const bool kept = of_the_host == 0;
@@ -110,6 +88,26 @@ static void a_later_signal_goes_to_the_host(void **state)
     }
     int ended = 0;
     assert_int_equal(waitpid(process, &ended, 0), process);
+    return ended;
+}
+
+static void a_later_signal_ends_the_process(void **state)
+{
+    (void)state;
+    skip_where_signals_wait();
+    const int ended =
+        end_of_two_signals(SIG_IGN); /* as a shell leaves it to what it starts in the background */
+    assert_true(WIFSIGNALED(ended) && WTERMSIG(ended) == SIGINT);
+}
+
+static void host_handles(int number) { of_the_host = number; }
+
+/* To the handler of the program that the library is in, such as Python's. */
+static void a_later_signal_goes_to_the_host(void **state)
+{
+    (void)state;
+    skip_where_signals_wait();
+    const int ended = end_of_two_signals(host_handles);
     assert_true(WIFEXITED(ended));
     assert_int_equal(WEXITSTATUS(ended), 7);
 }

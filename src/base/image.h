@@ -30,9 +30,9 @@ gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *
  *
  * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel, and the colours
  * as the file has them: times alpha in an EXR, not so in a PNG. The format is taken from the file's magic,
- * not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, deep or multi-part EXR,
- * and images of more than 2^29 samples are refused. Float values that are not finite become 0, with one
- * warning.
+ * not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, EXR that is deep,
+ * cropped or of several parts or has colours in layers alone, and images of more than 2^29 samples are
+ * refused. Float values that are not finite become 0, with one warning.
  *
  * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot open), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY

@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <stdint.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -228,13 +229,13 @@ static bool take_name(reader *r, uint64_t *at, char out[EXR_NAME_MAX])
     return !r->is_short;
 }
 
-/* Channel names of a chlist attribute: how many, and whether one is A. */
+/* Channel names of a chlist attribute: how many, and whether one is alpha's, as OpenImageIO has it. */
 static int64_t exr_channels(reader *r, uint64_t at, uint64_t end, bool *has_alpha)
 {
     char name[EXR_NAME_MAX];
     int64_t count = 0;
     while (at < end && take_name(r, &at, name) && name[0] != '\0') {
-        *has_alpha = *has_alpha || strcmp(name, "A") == 0;
+        *has_alpha = *has_alpha || strcasecmp(name, "A") == 0 || strcasecmp(name, "Alpha") == 0;
         at += 16;
         count++;
     }
@@ -247,7 +248,8 @@ static gbt_status read_exr(reader *r, image_header *out)
     unsigned char bytes[16];
     char name[EXR_NAME_MAX], type[EXR_NAME_MAX];
     uint64_t at = 8;
-    int64_t channels = 0, window[4] = {0, 0, -1, -1};
+    int64_t channels = 0, data[4] = {0, 0, -1, -1}, display[4] = {0};
+    bool has_display = false;
     take(r, 4, bytes, 4);
     if (little(bytes, 4) & (DEEP | PARTS))
         return base_fail(r->err, GBT_ERR_FORMAT,
@@ -264,16 +266,23 @@ static gbt_status read_exr(reader *r, image_header *out)
         }
         if (strcmp(name, "channels") == 0)
             channels = exr_channels(r, at, at + length, &out->has_alpha);
-        if (strcmp(name, "dataWindow") == 0 && length == 16) {
+        const bool is_display = strcmp(name, "displayWindow") == 0;
+        if ((is_display || strcmp(name, "dataWindow") == 0) && length == 16) {
             take(r, at, bytes, 16);
             for (int k = 0; k < 4; k++)
-                window[k] = (int32_t)little(bytes + 4 * k, 4);
+                (is_display ? display : data)[k] = (int32_t)little(bytes + 4 * k, 4);
+            has_display = has_display || is_display;
         }
         at += length;
     }
     if (r->is_short)
         return truncated(r, "EXR");
-    GBT_TRY(set_size(r, window[2] - window[0] + 1, window[3] - window[1] + 1, channels, out));
+    GBT_TRY(set_size(r, data[2] - data[0] + 1, data[3] - data[1] + 1, channels, out));
+    if (has_display && memcmp(data, display, sizeof data) != 0)
+        return base_fail(
+            r->err, GBT_ERR_FORMAT,
+            "%s: EXR is cropped: its data window is not its display window (wanted the whole picture)",
+            r->path);
     if (channels < 1)
         return base_fail(r->err, GBT_ERR_FORMAT, "%s: EXR has no channels", r->path);
     return at + 8 < r->size ? GBT_OK : truncated(r, "EXR"); /* at least one offset and something behind it */

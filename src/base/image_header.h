@@ -34,8 +34,8 @@ typedef struct image_header {
  * Whatever this refuses image_read() refuses; pixels may be damaged all the same.
  *
  * @return GBT_OK, GBT_ERR_IO (not a file, cannot be read), GBT_ERR_FORMAT (another format, truncated, an
- * image of no pixels or of more than IMAGE_SAMPLES_MAX samples) Threads: any. Cost: a few reads, whatever the
- * size of the file.
+ * image of no pixels or of more than IMAGE_SAMPLES_MAX samples, an EXR that is cropped) Threads: any. Cost: a
+ * few reads, whatever the size of the file.
  */
 gbt_status image_header_read(const char *path, image_header *out, gbt_error *err);
 

@@ -203,8 +203,23 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: image has channels \"%s\" and \"%s\" (wanted grey, RGB or RGBA)", path,
                          spec.channel_name(0).c_str(), spec.channel_name(1).c_str());
-    /* An EXR may go on with depth, normals and the like: they come after RGB and are left. */
-    o->stored_channels = o->is_grey ? spec.nchannels : spec.nchannels > 3 && spec.alpha_channel == 3 ? 4 : 3;
+    /* An EXR may go on with depth, normals and the like: they come after RGB and are left, as is the alpha of
+       a layer. */
+    const bool has_alpha =
+        spec.nchannels > 3 && spec.alpha_channel == 3 && spec.channel_name(3).find('.') == std::string::npos;
+    o->stored_channels = o->is_grey ? spec.nchannels : has_alpha ? 4 : 3;
+    return GBT_OK;
+}
+
+/* The first three channels are colours, unless an EXR has others: those of a layer, or numbers. */
+gbt_status check_colors(const char *path, const opened_image &o, gbt_error *err)
+{
+    static const char *const wanted[] = {"R", "G", "B"};
+    const OIIO::ImageSpec &spec = o.input->spec();
+    for (int c = 0; c < 3 && !o.is_grey && std::strcmp(o.input->format_name(), "openexr") == 0; c++)
+        if (!OIIO::Strutil::iequals(spec.channel_name(c), wanted[c]))
+            return base_fail(err, GBT_ERR_FORMAT, "%s: EXR has no channels R, G and B (got \"%s\", ...)",
+                             path, spec.channel_name(0).c_str());
     return GBT_OK;
 }
 
@@ -308,7 +323,9 @@ gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, 
 gbt_status read_pixels(const char *path, opened_image *o, image *out, unsigned char **valid, gbt_error *err)
 {
     const OIIO::ImageSpec &spec = o->input->spec();
-    gbt_status status = image_alloc(out, spec.width, spec.height, o->channels(), err);
+    gbt_status status = check_colors(path, *o, err);
+    if (status == GBT_OK)
+        status = image_alloc(out, spec.width, spec.height, o->channels(), err);
     if (status != GBT_OK)
         return status;
     switch (spec.format.basetype) {

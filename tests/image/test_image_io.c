@@ -11,6 +11,7 @@
 #include "base/image.h"
 #include "base/image_header.h"
 #include "base/memory.h"
+#include "exr_file.h"
 
 static char folder[] = "/tmp/gbt_image_XXXXXX";
 
@@ -446,6 +447,76 @@ static void exr_half_with_extra_channels(void **state)
     image_free(&im);
 }
 
+static const float seven[7] = {1, 2, 3, 4, 5, 6, 7};
+
+/* Names in any case; alpha is that of the picture, not of a layer. */
+static void exr_channels_are_found_by_name(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *names[4]; /* their values are 1, 2, 3, 4 */
+        int count, channels;
+        float pixel[4];
+    } rows[] = {{{"B", "G", "R", "a"}, 4, 4, {3, 2, 1, 4}},
+                {{"Alpha", "B", "G", "R"}, 4, 4, {4, 3, 2, 1}},
+                {{"b", "g", "r"}, 3, 3, {3, 2, 1}},
+                {{"B", "G", "R", "ViewLayer.A"}, 4, 3, {3, 2, 1}}};
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        exr_write(at("names.exr"), 1, 1, rows[r].count, rows[r].names, 2, seven);
+        image im;
+        image_header header;
+        assert_ok(image_read(at("names.exr"), &im, &assert_ok_err_));
+        assert_ok(image_header_read(at("names.exr"), &header, &assert_ok_err_));
+        assert_int_equal(im.channels, rows[r].channels);
+        assert_int_equal(header.has_alpha, im.channels == 4);
+        for (int c = 0; c < im.channels; c++)
+            assert_true(im.pixels[c] == rows[r].pixel[c]);
+        image_free(&im);
+    }
+}
+
+/* The first layer by name is not the picture. */
+static void refuses_exr_of_layers(void **state)
+{
+    (void)state;
+    static const char *const names[7] = {
+        "ViewLayer.AO.B",       "ViewLayer.AO.G",       "ViewLayer.AO.R",      "ViewLayer.Combined.A",
+        "ViewLayer.Combined.B", "ViewLayer.Combined.G", "ViewLayer.Combined.R"};
+    static const char *const place[3] = {"X", "Y", "Z"};
+    exr_write(at("layers.exr"), 1, 1, 7, names, 2, seven);
+    expect_failure(at("layers.exr"), GBT_ERR_FORMAT,
+                   "EXR has no channels R, G and B (got \"ViewLayer.AO.R\", ...)");
+    image im;
+    static image_names found;
+    assert_ok(image_read_raw(at("layers.exr"), &im, &found, &assert_ok_err_));
+    assert_int_equal(im.channels, 7);
+    assert_string_equal(found.name[0], "ViewLayer.AO.R");
+    image_free(&im);
+    exr_write(at("place.exr"), 1, 1, 3, place, 2, seven);
+    expect_failure(at("place.exr"), GBT_ERR_FORMAT, "EXR has no channels R, G and B");
+}
+
+static void refuses_cropped_exr(void **state)
+{
+    (void)state;
+    static const char *const names[3] = {"B", "G", "R"};
+    static const char start[] = "displayWindow\0box2i\0....";
+    exr_write(at("cropped.exr"), 2, 1, 3, names, 2, seven);
+    unsigned char *bytes;
+    size_t count;
+    assert_ok(file_read(at("cropped.exr"), &bytes, &count, &assert_ok_err_));
+    unsigned char *window = memmem(bytes, count, start, 20);
+    assert_non_null(window);
+    window[sizeof start - 1 + 8]++; /* its last column */
+    assert_ok(file_write_atomic(at("cropped.exr"), bytes, count, &assert_ok_err_));
+    mem_free(bytes);
+    image_header header;
+    gbt_error err = {0};
+    assert_int_equal(image_header_read(at("cropped.exr"), &header, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "its data window is not its display window"));
+    expect_failure(at("cropped.exr"), GBT_ERR_FORMAT, "EXR is cropped");
+}
+
 static void refuses_multipart_and_deep_exr(void **state)
 {
     (void)state;
@@ -542,7 +613,7 @@ static void reads_real_photos(void **state)
 int main(void)
 {
     enum { PNG_COUNT = sizeof png_cases / sizeof *png_cases };
-    struct CMUnitTest tests[PNG_COUNT + 12];
+    struct CMUnitTest tests[PNG_COUNT + 15];
     size_t count = 0;
     for (; count < PNG_COUNT; count++)
         tests[count] = (struct CMUnitTest){
@@ -556,6 +627,9 @@ int main(void)
         cmocka_unit_test(png_keeps_every_level_and_channel_count),
         cmocka_unit_test(exr_round_trip_is_exact),
         cmocka_unit_test(exr_half_with_extra_channels),
+        cmocka_unit_test(exr_channels_are_found_by_name),
+        cmocka_unit_test(refuses_exr_of_layers),
+        cmocka_unit_test(refuses_cropped_exr),
         cmocka_unit_test(refuses_multipart_and_deep_exr),
         cmocka_unit_test(write_refusals),
         cmocka_unit_test(no_memory),

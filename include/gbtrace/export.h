@@ -50,7 +50,7 @@ gbt_export_format gbt_export_format_at(int index);
  *
  * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args,
  * cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/,
- * results.json and per_view.json. Runs alone can be written so.
+ * results.json and per_view.json. Runs alone can be written so, and not beside a later iteration.
  *
  * @param input  [in] RUN (a folder with model.gbt), a model file, plain Gaussians, or a result folder of 3DGS
  * @param outputs [in] [output_count] file names, at most 16, each written atomically; their endings and

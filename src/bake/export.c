@@ -480,6 +480,8 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
     if (status == GBT_OK && e->baked)
         status = open_run(e, input, err);
     if (status == GBT_OK && e->folder != NULL)
+        status = export_folder_check(e->folder, &e->run, err);
+    if (status == GBT_OK && e->folder != NULL)
         status = file_make_folder(e->folder, err);
     for (int flat = 0; flat < 2 && status == GBT_OK; flat++)
         status = write_kind(e, input, flat, outputs, output_count, report, err);

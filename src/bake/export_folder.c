@@ -62,8 +62,8 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
     for (size_t i = 0; i < r->scene.view_count; i++)
         holds_out = holds_out || r->scene.views[i].is_test;
     snprintf(text, sizeof text,
-             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', resolution=%d, "
-             "white_background=%s, data_device='cpu', eval=%s)",
+             "Namespace(sh_degree=%d, source_path='%s', model_path='%s', images='images', depths='', "
+             "resolution=%d, white_background=%s, train_test_exp=False, data_device='cpu', eval=%s)",
              sh_degree, source, result, resolution_of(r), white ? "True" : "False",
              holds_out ? "True" : "False");
     GBT_TRY(file_join(path, sizeof path, folder, "cfg_args", err));
@@ -139,6 +139,19 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     struct stat info = {0};
     stat(path, &info);
     *bytes = (long long)info.st_size;
+    return GBT_OK;
+}
+
+gbt_status export_folder_check(const char *folder, const loaded_run *r, gbt_error *err)
+{
+    char clouds[PATH_SIZE];
+    unsigned long largest;
+    GBT_TRY(file_join(clouds, sizeof clouds, folder, "point_cloud", err));
+    if (file_largest_number(clouds, "iteration_", &largest) && largest > r->model.iterations)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "%s: holds iteration %lu, which readers take instead of %llu (wanted an empty folder)", folder,
+            largest, (unsigned long long)r->model.iterations);
     return GBT_OK;
 }
 

@@ -11,6 +11,9 @@
 /** Whether an output is meant as a result folder: its name ends in a slash. */
 bool export_folder_is(const char *path);
 
+/** GBT_ERR_ARGUMENT when it holds a later iteration than the run's: readers take the last one. */
+gbt_status export_folder_check(const char *folder, const loaded_run *r, gbt_error *err);
+
 /**
  * cfg_args, cameras.json (held-out views first, then those trained on), input.ply (the sparse points) and
  * point_cloud/iteration_N/point_cloud.ply, N the iterations of the run.

@@ -572,7 +572,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 4 "made/model.gbt: not there (wanted a run, a model file or plain Gaussians)" view made
     misuse 2 "--port: bad value (wanted a whole number from 0 to 65535, got 65536)" view run --port 65536
     "$program" export run result/ --refine 2 >out 2>err && grep -q '^result/: .* dB to the model' out && ls result/point_cloud/iteration_*/point_cloud.ply >>out 2>>err &&
-        grep -q "^Namespace(sh_degree=3, source_path='" result/cfg_args && [ "$(grep -c '"img_name": ' result/cameras.json)" = 4 ] &&
+        grep -q "^Namespace(sh_degree=3, source_path='.* depths='', .* train_test_exp=False, " result/cfg_args && [ "$(grep -c '"img_name": ' result/cameras.json)" = 4 ] &&
         [ -f result/input.ply ] && [ -f result/test/ours_*/gt/00000.png ] && grep -q '"PSNR": ' result/results.json && grep -q '"00000.png": ' result/per_view.json &&
         "$program" info result >>out 2>>err && grep -q 'gaussians .*, colours of degree 3' out && "$program" render result -o result_test >>out 2>>err &&
         [ "$(ls result_test | wc -l)" = 1 ] && sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o result_all >>out 2>>err &&

@@ -115,6 +115,9 @@ echo 0000.png >held # it is nearer to things than all that are trained on
 report $? "render draws a held-out photo with its near distance, as it was scored" "$(cat out)"
 "$program" export run fresh/n.ply fresh/ --refine 0 >out 2>err && [ -s fresh/n.ply ] && [ -s fresh/cfg_args ] && ! "$program" export run other/sub/n.ply other/ --refine 0 >>out 2>>err && [ ! -e other ]
 report $? "a file in a result folder that is named first" "$(cat err out)"
+mkdir -p res2/point_cloud/iteration_30000 &&
+    holds "a result folder of a later iteration" 2 '^error: res2/: holds iteration 30000, which readers take instead of 40 (wanted an empty folder)$' export run res2/ --refine 0 && [ "$(ls res2)" = point_cloud ]
+report $? "and nothing is written into it" "$(ls res2)"
 "$program" train made -o whole-set --iterations 3 --eval-split none --quiet >out 2>err && "$program" export whole-set set/ --refine 0 >>out 2>>err && grep -q 'eval=False' set/cfg_args && grep -q 'eval=True' result/cfg_args
 report $? "a result folder says whether photos were held out" "$(cat err out)"
 mkdir -p twice/point_cloud/iteration_1 && cp plain.ply twice/point_cloud/iteration_1/point_cloud.ply && camera='"width": 16, "height": 12, "fx": 15, "fy": 15, "rotation": [[1,0,0],[0,1,0],[0,0,1]], "img_name": "r_0"' &&

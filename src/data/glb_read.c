@@ -74,15 +74,30 @@ static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
     return wrong(r, "no primitive with KHR_gaussian_splatting", err);
 }
 
-static bool is_placed(const json_t *node)
+/* Whether numbers are there, and are others than these. */
+static bool is_not(const json_t *node, const char *key, const double *wanted, size_t count)
 {
-    return json_object_get(node, "matrix") != NULL || json_object_get(node, "rotation") != NULL ||
-           json_object_get(node, "scale") != NULL;
+    const json_t *numbers = json_object_get(node, key);
+    for (size_t k = 0; numbers != NULL && k < count; k++)
+        if (json_number_value(json_array_get(numbers, k)) != wanted[k])
+            return true;
+    return false;
 }
 
-/* The translation of the mesh's node, which is the cloud's origin. Other transformations are not read. */
+/* By more than a translation. */
+static bool is_placed(const json_t *node)
+{
+    static const double matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+                        rotation[4] = {0, 0, 0, 1}, scale[3] = {1, 1, 1};
+    return is_not(node, "matrix", matrix, 16) || is_not(node, "rotation", rotation, 4) ||
+           is_not(node, "scale", scale, 3);
+}
+
+/* The translation of the mesh's node, which is the cloud's origin. Other transformations are not read: those
+   of nodes with children may be the mesh's; the rest are cameras, lights and the like. */
 static gbt_status read_place(const reading *r, size_t mesh_index, double place[3], gbt_error *err)
 {
+    static const double nowhere[3] = {0, 0, 0};
     const json_t *node, *nodes = json_object_get(r->root, "nodes");
     size_t i;
     json_array_foreach(nodes, i, node)
@@ -90,7 +105,8 @@ static gbt_status read_place(const reading *r, size_t mesh_index, double place[3
         const json_t *mesh = json_object_get(node, "mesh"),
                      *translation = json_object_get(node, "translation");
         const bool own = json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
-        if (is_placed(node) || (translation != NULL && !own))
+        const bool matters = own || json_array_size(json_object_get(node, "children")) > 0;
+        if (matters && (is_placed(node) || (!own && is_not(node, "translation", nowhere, 3))))
             return wrong(r, "nodes with a matrix, rotation or scale, or one in another, are not read", err);
         for (size_t k = 0; own && k < 3; k++)
             place[k] = json_number_value(json_array_get(translation, k));

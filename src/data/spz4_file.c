@@ -5,6 +5,7 @@
 #include <zstd.h>
 
 #include "base/file.h"
+#include "base/log.h"
 #include "data/spz_streams.h"
 
 enum {
@@ -157,6 +158,9 @@ gbt_status spz4_read(const source_file *file, gaussian_cloud *out, gbt_error *er
     }
     if (status == GBT_OK)
         status = spz_unpack(streams, &f.header, out, err);
+    if (status == GBT_OK && f.header.degree > out->sh_degree)
+        log_warn("%s: harmonics of degree %d are left out (wanted %d at most)", file->name, f.header.degree,
+                 out->sh_degree);
     mem_free(streams);
     return status;
 }

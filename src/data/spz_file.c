@@ -7,7 +7,7 @@
 #include "data/gaussian_formats.h"
 #include "data/spz_streams.h"
 
-enum { HEADER_BYTES = 16 };
+enum { HEADER_BYTES = 16, EXTENSIONS_MAX = 1 << 20 };
 
 /* ---- writing ---- */
 
@@ -83,13 +83,19 @@ static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_
     return GBT_OK;
 }
 
-/* The stream ends here: its checksum and its length are right. */
-static gbt_status unzip_end(z_stream *z, const char *name, gbt_error *err)
+/* The stream ends, after at most `more` bytes that are not for us: its checksum and its length are right. */
+static gbt_status unzip_end(z_stream *z, const char *name, size_t more, gbt_error *err)
 {
-    unsigned char more;
-    z->next_out = &more;
-    z->avail_out = 1;
-    if (inflate(z, Z_FINISH) == Z_STREAM_END)
+    unsigned char block[4096];
+    size_t got = 0;
+    int code = Z_OK;
+    while (code == Z_OK && got <= more) {
+        z->next_out = block;
+        z->avail_out = sizeof block;
+        code = inflate(z, Z_NO_FLUSH);
+        got += sizeof block - z->avail_out;
+    }
+    if (code == Z_STREAM_END && got <= more)
         return GBT_OK;
     return base_fail(err, GBT_ERR_FORMAT, "%s: its gzip stream is damaged, or longer or shorter than it says",
                      name);
@@ -122,7 +128,7 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     unsigned char *streams = mem_alloc(count, row, "splats", err);
     gbt_status status = streams == NULL ? GBT_ERR_NO_MEMORY : unzip(z, file->name, streams, count * row, err);
     if (status == GBT_OK)
-        status = unzip_end(z, file->name, err);
+        status = unzip_end(z, file->name, header.flags & SPZ_EXTENSIONS ? EXTENSIONS_MAX : 0, err);
     if (status == GBT_OK)
         status = spz_unpack(streams, &header, out, err);
     mem_free(streams);

@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "base/log.h"
+
 enum {
     FRACTION_BITS_MAX = 16,
     COORDINATE_MAX = 8388607 /* 24 bits with a sign */
@@ -20,6 +22,22 @@ void spz_row_bytes(const spz_header *header, size_t out[SPZ_STREAMS])
 
 /* ---- writing ---- */
 
+static double scale_level(float scale_log) { return ((double)scale_log + 10) * 16; }
+
+/* Of a flat Gaussian the small scales do not matter. */
+static void warn_of_scales(const gaussian_cloud *cloud, const char *path)
+{
+    size_t outside = 0;
+    for (size_t i = 0; i < cloud->count; i++) {
+        const float *scale = cloud->scale_log + 3 * i;
+        const double level = scale_level(fmaxf(scale[0], fmaxf(scale[1], scale[2])));
+        outside += level < -0.5 || level > 255.5;
+    }
+    if (outside > 0)
+        log_warn("%s: Gaussians that .spz makes larger or smaller: %zu (wanted 4.5e-5 to 379 units)", path,
+                 outside);
+}
+
 gbt_status spz_header_of(const gaussian_cloud *cloud, const double origin[3], unsigned version,
                          const char *path, spz_header *out, gbt_error *err)
 {
@@ -35,6 +53,7 @@ gbt_status spz_header_of(const gaussian_cloud *cloud, const double origin[3], un
                         .count = (uint32_t)cloud->count,
                         .degree = cloud->sh_degree,
                         .flags = cloud->antialiased ? SPZ_ANTIALIASED : 0};
+    warn_of_scales(cloud, path);
     while (out->fraction < FRACTION_BITS_MAX && ldexp(largest, out->fraction + 1) <= COORDINATE_MAX)
         out->fraction++;
     return GBT_OK;
@@ -94,7 +113,7 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
         for (size_t c = 0; c < 3 && stream == 2; c++)
             sink_put_level(s, (double)sh[c] * color_step * 255 + 127.5);
         for (size_t k = 0; k < 3 && stream == 3; k++)
-            sink_put_level(s, ((double)scale[k] + 10) * 16);
+            sink_put_level(s, scale_level(scale[k]));
         if (stream == 4)
             sink_put_uint(s, pack_rotation(cloud->quat + 4 * i), 4);
         if (stream == 5)
@@ -106,11 +125,12 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
 
 gbt_status spz_header_check(const spz_header *header, const char *name, gbt_error *err)
 {
-    if (header->degree > 3 || header->fraction > 24 || header->count == 0)
+    const int degree_max = header->version == 4 ? 4 : 3;
+    if (header->degree > degree_max || header->fraction > 24 || header->count == 0)
         return base_fail(
             err, GBT_ERR_FORMAT,
-            "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to 3, 0 to 24)", name,
-            header->count, header->degree, header->fraction);
+            "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to %d, 0 to 24)", name,
+            header->count, header->degree, header->fraction, degree_max);
     return GBT_OK;
 }
 
@@ -151,7 +171,7 @@ gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, ga
     spz_row_bytes(header, row);
     const unsigned char *at = streams, *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n,
                         *rotation = scale + 3 * n, *harmonics = rotation + row[4] * n;
-    out->sh_degree = header->degree;
+    out->sh_degree = header->degree < 3 ? header->degree : 3; /* what is above is left */
     out->antialiased = header->flags & SPZ_ANTIALIASED;
     for (size_t i = 0; i < 3 * n; i++) {
         const uint32_t bits =
@@ -165,7 +185,7 @@ gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, ga
         out->opacity[i] = (float)alpha[i] / 255;
         for (size_t c = 0; c < 3; c++)
             sh[c] = (float)(((double)color[3 * i + c] - 127.5) / (color_step * 255));
-        for (size_t k = 0; k < row[5]; k++)
+        for (size_t k = 0; k < row[5] && k < 3 * (GAUSSIAN_SH_COUNT - 1); k++)
             sh[3 + k] = ((float)harmonics[row[5] * i + k] - 128) / 128;
         unpack_rotation(rotation + row[4] * i, header->version, out->quat + 4 * i);
         out->scales_clamped += gaussian_limit_scales(out->scale_log + 3 * i);

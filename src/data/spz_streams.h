@@ -10,14 +10,15 @@
 enum {
     SPZ_MAGIC = 0x5053474e, /* "NGSP" */
     SPZ_STREAMS = 6,
-    SPZ_ANTIALIASED = 1 /* of the flags */
+    SPZ_ANTIALIASED = 1, /* of the flags */
+    SPZ_EXTENSIONS = 2 /* records that other programs may pass over: behind the streams, or before a table */
 };
 
 /** What a file's header says. */
 typedef struct spz_header {
     unsigned version; /* 2, 3 or 4 */
     uint32_t count;
-    int degree;   /* of the harmonics */
+    int degree;   /* of the harmonics, 0 to 3; in version 4 to 4 */
     int fraction; /* bits of a position behind the point */
     unsigned flags;
 } spz_header;
@@ -26,7 +27,8 @@ typedef struct spz_header {
 void spz_row_bytes(const spz_header *header, size_t out[SPZ_STREAMS]);
 
 /**
- * The header of a cloud: as many fractional bits, up to 16, as its largest coordinate leaves of 23.
+ * The header of a cloud: as many fractional bits, up to 16, as its largest coordinate leaves of 23. A warning
+ * says how many Gaussians are too large or too small for the scales that the format has.
  *
  * @return GBT_OK; GBT_ERR_ARGUMENT (a coordinate beyond 8 million, too many Gaussians)
  */
@@ -40,7 +42,8 @@ gbt_status spz_header_check(const spz_header *header, const char *name, gbt_erro
 void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3], const spz_header *header,
                     int stream);
 
-/** The Gaussians of all streams, one behind the other. Free with gaussian_cloud_free(). */
+/** The Gaussians of all streams, one behind the other, without harmonics of degree 4. Free with
+    gaussian_cloud_free(). */
 gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, gaussian_cloud *out,
                       gbt_error *err);
 

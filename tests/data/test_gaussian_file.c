@@ -254,6 +254,57 @@ static void glb_that_is_wrong(void **state)
     gaussian_cloud_free(&a);
 }
 
+/* Nodes beside the Gaussians' own, and those that they are in. */
+static void glb_nodes_of_others(void **state)
+{
+    static const char own[] = "{\"mesh\":0,\"translation\":[1,2,3]}";
+    static const struct {
+        const char *other;
+        bool is_read;
+    } rows[] = {{"{\"camera\":0,\"translation\":[4,5,6],\"rotation\":[0,1,0,0]}", true},
+                {"{\"children\":[0],\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}", true},
+                {"{\"children\":[0],\"rotation\":[0,0,0,1],\"scale\":[1,1,1],\"translation\":[0,0,0]}", true},
+                {"{\"children\":[0],\"translation\":[0,0,1]}", false},
+                {"{\"children\":[0],\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,1,1]}", false},
+                {"{\"children\":[0],\"rotation\":[0,1,0,0]}", false},
+                {"{\"children\":[0],\"scale\":[1,1,2]}", false}};
+    gaussian_cloud a, b;
+    make_cloud(&a, 5, 0);
+    must(gaussian_file_write(inside(*state, "n.glb", 0), &a, nowhere, &err));
+    gaussian_cloud_free(&a);
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(inside(*state, "n.glb", 0), &bytes, &size, &err));
+    const source_file file = {"n.glb", bytes, size};
+    cursor c = {.file = &file, .at = 12};
+    const size_t length = cursor_u32(&c);
+    json_t *root = json_loadb((const char *)bytes + 20, length, 0, NULL);
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        char nodes[512];
+        snprintf(nodes, sizeof nodes, "[%s,%s]", own, rows[r].other);
+        json_object_set_new(root, "nodes", json_loads(nodes, 0, NULL));
+        char *text = json_dumps(root, 0);
+        sink s = {0};
+        sink_put(&s, bytes, 12);
+        sink_put_uint(&s, strlen(text), 4);
+        sink_put(&s, "JSON", 4);
+        sink_put(&s, text, strlen(text));
+        sink_put(&s, bytes + 20 + length, size - 20 - length);
+        const source_file changed = {"n.glb", s.bytes, s.size};
+        gbt_error said = {0};
+        const gbt_status status = gaussian_format_glb.read(&changed, &b, &said);
+        if (status != (rows[r].is_read ? GBT_OK : GBT_ERR_FORMAT))
+            fail_msg("%s: %s", rows[r].other, said.text);
+        assert_true(status == GBT_OK ? b.origin[0] == -1 && b.origin[1] == -2 && b.origin[2] == 3
+                                     : strstr(said.text, "or one in another") != NULL);
+        gaussian_cloud_free(&b);
+        sink_free(&s);
+        free(text);
+    }
+    json_decref(root);
+    mem_free(bytes);
+}
+
 static void glb_is_what_gltf_wants(void **state)
 {
     gaussian_cloud a;
@@ -410,6 +461,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(spz_bytes, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(glb_round_trip, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(glb_that_is_wrong, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(glb_nodes_of_others, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(glb_is_what_gltf_wants, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(damaged_files, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(refusals, make_temporary, remove_temporary),

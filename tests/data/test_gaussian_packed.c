@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/data/test_gaussian_packed.c -- plain Gaussians in small files and back: what each format keeps, its
    bytes, damaged files. */
+#include <zlib.h>
+
 #include "data/gaussian_file.h"
 #include "data/gaussian_formats.h"
 #include "data/gaussian_order.h"
 #include "data/gaussian_support.h"
 #include "data/palette.h"
+#include "data/spz_streams.h"
+#include "gbtrace/progress.h"
 
 /* Write, read, and bring back into order. */
 static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3],
@@ -57,6 +61,100 @@ static void spz4_keeps_the_values_of_spz(void **state)
         gaussian_cloud_free(&a);
         gaussian_cloud_free(&three);
         gaussian_cloud_free(&four);
+    }
+}
+
+/* `from` with a record behind its streams, as other programs may write it, zipped again. */
+static void put_extension(const char *from, const char *to, unsigned char flags, unsigned char damage)
+{
+    enum { ROOM = 1 << 16 };
+    static const unsigned char record[12] = {2, 0, 0xbe, 0xad, 4, 0, 0, 0, 1, 2, 3, 4};
+    static unsigned char plain[ROOM], zipped[ROOM];
+    unsigned char *bytes;
+    size_t size;
+    must(file_read(from, &bytes, &size, &err));
+    z_stream in = {.next_in = bytes, .avail_in = (uInt)size, .next_out = plain, .avail_out = ROOM - 12};
+    assert_int_equal(inflateInit2(&in, 15 + 16), Z_OK);
+    assert_int_equal(inflate(&in, Z_FINISH), Z_STREAM_END);
+    plain[14] |= flags;
+    memcpy(plain + in.total_out, record, sizeof record);
+    z_stream out = {.next_in = plain,
+                    .avail_in = (uInt)in.total_out + sizeof record,
+                    .next_out = zipped,
+                    .avail_out = ROOM};
+    assert_int_equal(deflateInit2(&out, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+    assert_int_equal(deflate(&out, Z_FINISH), Z_STREAM_END);
+    zipped[out.total_out - 8] ^= damage; /* of the checksum */
+    must(file_write_atomic(to, zipped, out.total_out, &err));
+    inflateEnd(&in);
+    deflateEnd(&out);
+    mem_free(bytes);
+}
+
+static void spz_with_extensions(void **state)
+{
+    gaussian_cloud a, plain, more;
+    make_cloud(&a, 300, 2);
+    const char *from = inside(*state, "a.spz", 0), *to = inside(*state, "b.spz", 1);
+    must(gaussian_file_write(from, &a, nowhere, &err));
+    must(gaussian_file_read(from, &plain, &err));
+    put_extension(from, to, SPZ_EXTENSIONS, 0);
+    must(gaussian_file_read(to, &more, &err));
+    check_near(&plain, &more, nowhere, &(limits){.quat = 1e-7});
+    gaussian_cloud_free(&more);
+    put_extension(from, to, SPZ_EXTENSIONS, 1);
+    assert_int_equal(gaussian_file_read(to, &more, NULL), GBT_ERR_FORMAT);
+    put_extension(from, to, 0, 0); /* more than it says */
+    assert_int_equal(gaussian_file_read(to, &more, NULL), GBT_ERR_FORMAT);
+    gaussian_cloud_free(&plain);
+    gaussian_cloud_free(&a);
+}
+
+/* Two Gaussians of version 4 whose harmonics are all 128 + their number. */
+static void spz4_of_degree_4(void **state)
+{
+    (void)state;
+    unsigned char streams[2 * (9 + 1 + 3 + 3 + 4 + 72)] = {0}, *harmonics = streams + 2 * 20;
+    for (int i = 0; i < 2 * 72; i++)
+        harmonics[i] = (unsigned char)(128 + i % 72);
+    spz_header header = {.version = 4, .count = 2, .degree = 4, .fraction = 12};
+    gaussian_cloud c = {0};
+    must(spz_header_check(&header, "a", &err));
+    must(spz_unpack(streams, &header, &c, &err));
+    assert_int_equal(c.sh_degree, 3);
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 45; k++)
+            assert_true(c.sh[48 * i + 3 + k] == (float)k / 128);
+    gaussian_cloud_free(&c);
+    header.version = 3;
+    assert_int_equal(spz_header_check(&header, "a", NULL), GBT_ERR_FORMAT);
+}
+
+static void keep_warning(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_WARNING)
+        snprintf(context, 256, "%s", event->text);
+}
+
+/* Flat ones are drawn alike; large and tiny ones are not. */
+static void spz_tells_scales_that_it_has_not(void **state)
+{
+    static const struct {
+        float scale_log[3];
+        bool is_told;
+    } rows[] = {{{7, 7, 7}, true}, {{-3, 7, -3}, true}, {{-3, -3, -13}, false}, {{-13, -11, -12}, true}};
+    static const char *const names[] = {"a.spz", "a.v4.spz"};
+    for (size_t r = 0; r < 2 * sizeof rows / sizeof *rows; r++) {
+        char said[256] = "";
+        gaussian_cloud a;
+        make_cloud(&a, 3, 0);
+        memcpy(a.scale_log + 3, rows[r / 2].scale_log, sizeof rows->scale_log);
+        gbt_listen(keep_warning, said);
+        must(gaussian_file_write(inside(*state, names[r % 2], 0), &a, nowhere, &err));
+        gbt_listen(NULL, NULL);
+        gaussian_cloud_free(&a);
+        if ((strstr(said, "larger or smaller: 1 (wanted") != NULL) != rows[r / 2].is_told)
+            fail_msg("%zu: %s", r, said);
     }
 }
 
@@ -422,6 +520,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(compressed_ply_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(compressed_ply_bytes, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz4_keeps_the_values_of_spz, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(spz_with_extensions, make_temporary, remove_temporary),
+        cmocka_unit_test(spz4_of_degree_4),
+        cmocka_unit_test_setup_teardown(spz_tells_scales_that_it_has_not, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(spz4_bytes, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(sog_keeps_its_steps, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(sog_palette_is_exact, make_temporary, remove_temporary),

@@ -23,7 +23,7 @@
 #include "run/loaded_run.h"
 #include "study/runs_stat.h"
 
-enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + 1024 };
+enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + PATH_SIZE };
 
 /* ---- names ---- */
 
@@ -141,11 +141,10 @@ static bool read_run(const char *study_path, const char *metrics_path, const cha
     gbt_error ignored = {0};
     bool fine = json_read(study_path, &study, &ignored) == GBT_OK &&
                 json_read(metrics_path, &metrics, &ignored) == GBT_OK;
-    if (fine) {
-        const char *theirs = json_string_value(json_object_get(study, "settings"));
-        fine = theirs != NULL && strcmp(theirs, settings) == 0 && read_measured(study, out) &&
-               read_metrics(metrics, out);
-    }
+    json_t *ours = json_text(settings); /* as it was saved, whatever bytes a path has */
+    fine = fine && json_equal(json_object_get(study, "settings"), ours) && read_measured(study, out) &&
+           read_metrics(metrics, out);
+    json_decref(ours);
     json_decref(study);
     json_decref(metrics);
     return fine;
@@ -276,7 +275,9 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     char study_path[PATH_SIZE], metrics_path[PATH_SIZE], settings[SETTINGS_SIZE];
     GBT_TRY(file_join(study_path, sizeof study_path, run, "study.json", err));
     GBT_TRY(file_join(metrics_path, sizeof metrics_path, run, "metrics.json", err));
-    settings_text(data, def, settings, sizeof settings);
+    char *whole = realpath(data, NULL); /* one data set has one name */
+    settings_text(whole != NULL ? whole : data, def, settings, sizeof settings);
+    free(whole);
     if (read_run(study_path, metrics_path, settings, out)) {
         log_info("%s: there already", run);
         bool scored;

@@ -2,6 +2,7 @@
 /* run/loaded_run.c -- open a trained run for rendering. */
 #include "run/loaded_run.h"
 
+#include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -318,15 +319,24 @@ static const char *ending_of(const char *name)
     return NULL;
 }
 
+/* Whether JSON can say it. */
+static bool is_utf8(const char *name)
+{
+    json_t *value = json_string(name);
+    json_decref(value);
+    return value != NULL;
+}
+
 void loaded_run_file_name(const char *name, char out[FILE_NAME_SIZE])
 {
+    const bool is_text = is_utf8(name);
     const char *ending = ending_of(name);
     const size_t length = ending != NULL ? (size_t)(ending - name) : strlen(name);
     snprintf(out, FILE_NAME_SIZE, "%.*s", length < FILE_NAME_SIZE ? (int)length : FILE_NAME_SIZE - 1, name);
     for (char *c = out; *c != '\0'; c++)
-        if (*c == '/')
+        if (*c == '/' || (!is_text && (unsigned char)*c >= 0x80))
             *c = '_';
-    if (length > FILE_NAME_MAX)
+    if (length > FILE_NAME_MAX || !is_text)
         add_hash(name, out);
 }
 

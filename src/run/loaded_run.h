@@ -85,7 +85,7 @@ gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_er
 
 enum { FILE_NAME_SIZE = 256 };
 
-/** "a/b.jpg" becomes "a_b": a file name for what belongs to a view, of 200 bytes at most. */
+/** "a/b.jpg" becomes "a_b": a file name for what belongs to a view, of 200 bytes of UTF-8 at most. */
 void loaded_run_file_name(const char *view_name, char out[FILE_NAME_SIZE]);
 
 /** The same for an open view; where another view's is the same ("a.png" and "a.jpg"), with a hash of the

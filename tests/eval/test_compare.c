@@ -43,11 +43,9 @@ static void figures_are_those_of_the_metrics(void **state)
 static void pictures_are_named_after_views(void **state)
 {
     (void)state;
-    static const char *const names[][2] = {{"a/b.jpg", "a_b"},
-                                           {"a.b/c.JPEG", "a.b_c"},
-                                           {"1623.25", "1623.25"},
-                                           {"1623.25.png", "1623.25"},
-                                           {".png", ".png"}};
+    static const char *const names[][2] = {{"a/b.jpg", "a_b"},     {"a.b/c.JPEG", "a.b_c"},
+                                           {"1623.25", "1623.25"}, {"1623.25.png", "1623.25"},
+                                           {".png", ".png"},       {"\xc3\xa4.png", "\xc3\xa4"}};
     char got[FILE_NAME_SIZE], other[FILE_NAME_SIZE], name[3000];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         loaded_run_file_name(names[i][0], got);
@@ -61,6 +59,11 @@ static void pictures_are_named_after_views(void **state)
     assert_true(strlen(got) == 179 + 17 && got[179] == '-');
     name[sizeof name - 4] = '\0';
     loaded_run_file_name(name, other);
+    assert_string_not_equal(got, other);
+    /* What is not UTF-8 would be another name in JSON. */
+    loaded_run_file_name("x\xe4/y.png", got);
+    loaded_run_file_name("x\xf6/y.png", other);
+    assert_true(strncmp(got, "x__y-", 5) == 0 && strlen(got) == 4 + 17);
     assert_string_not_equal(got, other);
     /* Two views never share one. */
     scene_view views[] = {

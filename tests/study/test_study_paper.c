@@ -459,6 +459,35 @@ static void runs_are_made_once(void **state)
     assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), before[0][0]));
     assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-1")), before[0][1]));
     assert_near(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "iterations"), 41, 0);
+
+    /* By another path it is the same data set; the same path from another folder is another one. */
+    char slash[PATH_SIZE + 1], here[4096];
+    snprintf(slash, sizeof slash, "%s/", tiny);
+    const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    data[0] = slash;
+    paper_ok(&other, in_root("paper"));
+    data[0] = "tiny";
+    assert_non_null(getcwd(here, sizeof here));
+    assert_int_equal(chdir(root), 0);
+    paper_ok(&other, in_root("paper"));
+    assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), made));
+    assert_int_equal(chdir(in_root("other")), 0);
+    paper_ok(&other, in_root("paper"));
+    assert_int_equal(chdir(here), 0);
+    assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), made));
+}
+
+/* Its settings are saved as JSON, which has no such bytes. */
+static void data_named_in_latin_1(void **state)
+{
+    (void)state;
+    const gbt_train_def def = run_def();
+    study_figures figures;
+    make_tiny_scene(in_root("l\xe4nge"));
+    assert_ok(study_runs_do(in_root("l\xe4nge"), in_root("latin"), &def, NULL, &figures, &assert_ok_err_));
+    const struct timespec made = time_of(in_root("latin"));
+    assert_ok(study_runs_do(in_root("l\xe4nge"), in_root("latin"), &def, NULL, &figures, &assert_ok_err_));
+    assert_false(is_newer(time_of(in_root("latin")), made));
 }
 
 static void bad_requests(void **state)
@@ -614,6 +643,7 @@ int main(void)
         cmocka_unit_test(bad_requests),           cmocka_unit_test(the_papers_tables),
         cmocka_unit_test(lpips_of_finished_runs), cmocka_unit_test(runs_are_made_once),
         cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
+        cmocka_unit_test(data_named_in_latin_1),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

@@ -55,6 +55,8 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
  *
  * @param studies [in] [study_count] folders that gbtrace study wrote, or SVG files; NULL with 0
  * @return GBT_OK, GBT_ERR_IO (no metrics.json, no such study), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: any, with distinct runs.
  */
 gbt_status gbt_report(const char *run, const char *const *studies, size_t study_count, gbt_error *err);
 
@@ -72,6 +74,8 @@ typedef struct gbt_comparison {
  * the original.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: any, with distinct `out`.
  */
 gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
 
@@ -82,6 +86,8 @@ gbt_status gbt_compare_images(const char *path, const char *reference, gbt_compa
  * @param out [out] of colours in [-1, 1], as the network was trained; and in [0, 1], as the scores of 3DGS
  *                  are made
  * @return as gbt_compare_images(); GBT_ERR_ARGUMENT also when the pictures are too small for the network
+ *
+ * Threads: any, with distinct `out`.
  */
 gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2],
                              gbt_error *err);
@@ -90,6 +96,8 @@ gbt_status gbt_compare_lpips(const char *path, const char *reference, const char
  * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
+ *
+ * Threads: any, with distinct `out`.
  */
 gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height,
                                 gbt_comparison *out, gbt_error *err);
@@ -139,6 +147,8 @@ gbt_render_def gbt_render_def_default(void);
  * before.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: any, with distinct `out`.
  */
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err);
 

@@ -58,8 +58,8 @@ gbt_export_format gbt_export_format_at(int index);
  * @param report [in] open stream; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *
- * Threads: same bytes for every thread count. Cost: one pass over the training cameras, the steps, and up to
- * 16 held-out views (all of them for a folder).
+ * Threads: any, with distinct outputs; same bytes for every thread count. Cost: one pass over the training
+ * cameras, the steps, and up to 16 held-out views (all of them for a folder).
  */
 gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *const *outputs,
                       size_t output_count, FILE *report, gbt_error *err);

@@ -32,6 +32,8 @@ gbt_import_def gbt_import_def_default(void);
  * atomically, a folder with a trained run is refused
  * @param report [in] open stream for one line; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ *
+ * Threads: any, with distinct runs.
  */
 gbt_status gbt_import(const char *input, const gbt_import_def *def, const char *run, FILE *report,
                       gbt_error *err);

@@ -45,7 +45,7 @@ gbt_init_def gbt_init_def_default(void);
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no
  *         points), GBT_ERR_IO, GBT_ERR_NO_MEMORY
  *
- * Threads: same bytes for every thread count. Cost: O(n log n) for n points.
+ * Threads: any, with distinct outputs; same bytes for every thread count. Cost: O(n log n) for n points.
  */
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,
                     FILE *report, gbt_error *err);

@@ -47,7 +47,7 @@ typedef struct gbt_gaussians {
     int sh_degree;          /* 0 to 3 */
     const float *mean;      /* [count][3] */
     const float *scale_log; /* [count][3], natural log of the std-devs, [-30, 30] */
-    const float *quat;      /* [count][4], w x y z, of any length but 0 */
+    const float *quat;      /* [count][4], w x y z, of any length from 1e-18 */
     const float *opacity;   /* [count], [0, 1] */
     const float *sh;        /* [count][(sh_degree + 1)^2][3], coefficients in the order of 3DGS files */
 } gbt_gaussians;
@@ -72,6 +72,18 @@ gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt
  */
 gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *g, gbt_error *err);
 
+/**
+ * The plain Gaussians of a model as they are drawn: quaternions of length 1, scales raised as
+ * gbt_model_from_gaussians() does, and of a file without the rows that are not usable. In a model that is
+ * made of them the picture is the same but for the rounding of floats.
+ *
+ * @param mean, scale_log, quat, opacity, sh [out] shapes as in gbt_gaussians, with `gaussians` of
+ *                                           gbt_model_get_info() as count; NULL: not wanted
+ * @return GBT_OK, or GBT_ERR_ARGUMENT: networks make its Gaussians for each view (gbt_export() first)
+ */
+gbt_status gbt_model_get_gaussians(const gbt_model *model, float *mean, float *scale_log, float *quat,
+                                   float *opacity, float *sh, gbt_error *err);
+
 /** NULL is fine. */
 void gbt_model_close(gbt_model *model);
 
@@ -91,12 +103,12 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 
 /** How pictures are made. */
 typedef struct gbt_model_settings {
-    float background[3]; /* behind everything. Default the model's; black for plain Gaussians. A sky that was
-                            learned is added to it until it is changed */
+    float background[3]; /* behind everything. Default the model's; of plain Gaussians black, or white as a
+                            result folder says. A sky that was learned is added to it until it is changed */
     float footprint; /* rays are as wide as pixels: variance of a pixel, px^2, [0, 4]; 0: thin rays. Default
                         as trained; 0.1 for plain Gaussians */
-    float t_near;    /* nearest distance at which anything is seen, >= 0. Default as trained; 0.01 for plain
-                        Gaussians */
+    float t_near;    /* nearest distance at which anything is seen, >= 0. Default as trained; of plain
+                        Gaussians 0.01, or what the file says */
     float alpha_min; /* smallest response that counts, (0, 1). Default 1/255 */
     float alpha_max; /* responses are cut here, (0, 1). Default 0.99 */
     float transmittance_min; /* a ray ends before less than this is left, (0, 1). Default 1e-4 */
@@ -114,6 +126,7 @@ typedef struct gbt_model_view {
                           the model closed */
     bool held_out;     /* training did not see it */
     gbt_camera camera; /* at the size that training used */
+    float t_near;      /* for gbt_model_set_settings(): of training, and of gbt_render(), for this photo */
 } gbt_model_view;
 
 /**
@@ -154,7 +167,8 @@ gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, bool kee
                             gbt_error *err);
 
 /** Where gradients of plain Gaussians go: the caller's arrays, shapes as in gbt_gaussians, overwritten. NULL:
-    not wanted. */
+    not wanted. Of the values that were given; of a model from a file, of those that gbt_model_get_gaussians()
+    gives. */
 typedef struct gbt_gaussians_gradient {
     float *mean;      /* [count][3] */
     float *scale_log; /* [count][3] */

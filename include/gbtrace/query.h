@@ -155,6 +155,8 @@ gbt_query_def gbt_query_def_default(void);
  *
  * @param path [in] as gbt_balls_open()
  * @return as gbt_balls_open() and the queries
+ *
+ * Threads: any, with distinct `out`.
  */
 gbt_status gbt_query(const char *path, const gbt_query_def *def, FILE *out, gbt_error *err);
 

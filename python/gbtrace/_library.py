@@ -60,7 +60,7 @@ class CModelSettings(c.Structure):
 
 
 class CModelView(c.Structure):
-    _fields_ = [("name", c.c_char_p), ("held_out", c.c_bool), ("camera", CCamera)]
+    _fields_ = [("name", c.c_char_p), ("held_out", c.c_bool), ("camera", CCamera), ("t_near", c.c_float)]
 
 
 class CPicture(c.Structure):
@@ -110,6 +110,7 @@ FUNCTIONS = {
     "gbt_model_open": ("status", [text, c.POINTER(pointer)]),
     "gbt_model_from_gaussians": ("status", [c.POINTER(CGaussians), c.POINTER(pointer)]),
     "gbt_model_set_gaussians": ("status", [pointer, c.POINTER(CGaussians)]),
+    "gbt_model_get_gaussians": ("status", [pointer, pointer, pointer, pointer, pointer, pointer]),
     "gbt_model_close": (None, [pointer]),
     "gbt_model_get_info": (CModelInfo, [pointer]),
     "gbt_model_get_settings": (CModelSettings, [pointer]),

@@ -47,6 +47,9 @@ class Camera:
         camera._c = CCamera.from_buffer_copy(struct)
         return camera
 
+    def __copy__(self):
+        return Camera._of(self._c)
+
     @property
     def model(self):
         return library.gbt_camera_model_name(self._c.model).decode()
@@ -105,7 +108,7 @@ class Camera:
         """The same lens at `origin`, with `target` in the middle of its picture and `up` towards its top."""
         out = Camera._of(self._c)
         if not library.gbt_camera_look_at(_doubles(origin, 3), _doubles(target, 3), _doubles(up, 3), c.byref(out._c)):
-            raise ArgumentError("camera: the target is at the origin, or up is along the view")
+            raise ArgumentError("camera: the target is at the origin, up is along the view, or a value is not finite")
         return out
 
     def moved(self, motion):
@@ -113,8 +116,13 @@ class Camera:
         return Camera._of(library.gbt_camera_moved(c.byref(self._c), _doubles(motion, 6)))
 
     def resized(self, width, height):
-        """The same camera for a picture of another size."""
-        return Camera._of(library.gbt_camera_resized(c.byref(self._c), whole_number(width, "width", 1), whole_number(height, "height", 1)))
+        """The same camera for a picture of another size; where both axes share a focal length, one of the same shape within a pixel."""
+        width, height = whole_number(width, "width", 1), whole_number(height, "height", 1)
+        has_one_f = library.gbt_camera_param_names(self._c.model).startswith(b"f ")
+        if has_one_f and abs(width * self.height - height * self.width) > max(self.width, self.height):
+            raise ArgumentError(f"camera: {self.model} has one focal length, {self.width} x {self.height} pixels cannot become {width} x {height} "
+                                "(wanted the same shape)")
+        return Camera._of(library.gbt_camera_resized(c.byref(self._c), width, height))
 
     def distance(self, other):
         """How far apart two poses are: between the centres, and the angle in radians."""

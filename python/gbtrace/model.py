@@ -48,6 +48,7 @@ class View(NamedTuple):
     name: str
     held_out: bool
     camera: Camera
+    t_near: float  # for model.settings: of training, and of the program's render, for this photo
 
 
 def _gaussians_struct(g):
@@ -87,11 +88,24 @@ class Model:
         struct = _gaussians_struct(Gaussians(mean, scale_log, quat, opacity, sh))
         lib.call("gbt_model_set_gaussians", self._open(), c.byref(struct))
 
+    def __reduce_ex__(self, protocol):
+        raise TypeError("a gbtrace.Model cannot be copied or pickled (open it again)")
+
+    def gaussians(self):
+        """Its plain Gaussians as they are drawn, in new arrays, in the form that set_gaussians() takes; those of a file are what gradient() is of."""
+        g = Gaussians(*(np.empty(shape, np.float32) for shape in self._shapes()))
+        lib.call("gbt_model_get_gaussians", self._open(), *(a.ctypes.data for a in g))
+        return g
+
+    def _shapes(self):
+        i = self.info
+        return Gaussians((i.gaussians, 3), (i.gaussians, 3), (i.gaussians, 4), (i.gaussians,), (i.gaussians, (i.sh_degree + 1) ** 2, 3))
+
     def close(self):
         """Give its memory back now. It cannot be used any more."""
         if getattr(self, "_handle", None):
-            lib.library.gbt_model_close(self._handle)
-            self._handle = c.c_void_p()
+            handle, self._handle = self._handle, c.c_void_p()  # before the call, which Ctrl-C can interrupt when all is freed
+            lib.library.gbt_model_close(handle)
 
     __del__ = close
 
@@ -131,7 +145,7 @@ class Model:
         views = []
         for i in range(count.value):
             lib.call("gbt_model_get_view", self._open(), i, c.byref(view))
-            views.append(View(view.name.decode("utf-8", "surrogateescape"), bool(view.held_out), Camera._of(view.camera)))
+            views.append(View(view.name.decode("utf-8", "surrogateescape"), bool(view.held_out), Camera._of(view.camera), view.t_near))
         return views
 
     def render(self, camera, rgb=None, depth=None, transmittance=None, keep=False):
@@ -151,7 +165,7 @@ class Model:
         self._size = size
         return rgb
 
-    def gradient(self, d_rgb, gaussians=None):
+    def gradient(self, d_rgb, gaussians=False):
         """From dL/d(rgb) of the last render(keep=True) to dL/d(motion) of its camera (see Camera.moved), an array of six.
 
         `gaussians`: True to get the gradients of plain Gaussians too, or a Gaussians of arrays that are written in place (None in it: not
@@ -162,12 +176,12 @@ class Model:
             raise ValueError("gradient: there is no render to differentiate (wanted render(keep=True) before)")
         pose, struct = np.zeros(6), None
         at = lib.address(d_rgb, "d_rgb", (*size, 3))
-        if gaussians is not None:
-            i = self.info
-            shapes = Gaussians((i.gaussians, 3), (i.gaussians, 3), (i.gaussians, 4), (i.gaussians,), (i.gaussians, (i.sh_degree + 1) ** 2, 3))
+        wants = gaussians is not None and gaussians is not False
+        if wants:
+            shapes = self._shapes()
             if gaussians is True:
                 gaussians = Gaussians(*(np.empty(shape, np.float32) for shape in shapes))
             struct = lib.CGaussiansGradient(*(None if a is None else lib.address(a, name, shape, True)
                                               for a, name, shape in zip(gaussians, Gaussians._fields, shapes)))
         lib.call("gbt_model_gradient", self._open(), at, pose.ctypes.data_as(c.POINTER(c.c_double)), None if struct is None else c.byref(struct))
-        return pose if gaussians is None else (pose, gaussians)
+        return (pose, gaussians) if wants else pose

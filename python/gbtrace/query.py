@@ -62,6 +62,9 @@ class Balls:
     def __len__(self):
         return len(self.position)
 
+    def __reduce_ex__(self, protocol):
+        raise TypeError("a gbtrace.Balls cannot be copied or pickled (open it again)")
+
     def __del__(self):
         if getattr(self, "_c", None) is not None:
             lib.library.gbt_balls_free(self._c)

@@ -22,8 +22,9 @@ class Comparison(NamedTuple):
 def train(data, run, **settings):
     """Train on the posed photos in the folder `data`, write everything into the folder `run`, open the model.
 
-    Settings have the names of RUN/config, with _ for -: train("photos", "run", iterations=2000, downscale=2). Progress goes to stderr; Ctrl-C
-    saves a checkpoint and raises KeyboardInterrupt. train(None, "run", resume=True, iterations=4000) goes on with a run, here to 4000 steps.
+    Settings have the names of RUN/config, with _ for -: train("photos", "run", iterations=2000, downscale=2). Progress goes to stderr.
+    SIGINT (Ctrl-C), SIGTERM and stop_at_step save a checkpoint and raise KeyboardInterrupt. train(None, "run", resume=True, iterations=4000)
+    goes on with a run, here to 4000 steps.
     """
     lines = "".join(_setting(key.replace("_", "-"), int(value) if isinstance(value, bool) else value) for key, value in settings.items())
     lib.call("gbt_train_with", lib.optional(data), lib.encode(run), lines.encode())

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python package on a small model: GBT_MODEL is a run, GBT_INCLUDE the headers, GBT_SCRATCH a folder to write into."""
+import copy
 import ctypes
 import os
 import subprocess
 import sys
 import threading
 import unittest
+import unittest.mock
 from pathlib import Path
 
 import gbtrace
@@ -89,6 +91,10 @@ class Balls(unittest.TestCase):
         self.assertTrue((balls.radius > 0).all())
         np.testing.assert_array_equal(balls.position.min(axis=0), info.low)
 
+    def test_no_copies(self):
+        with self.assertRaisesRegex(TypeError, "a gbtrace.Balls cannot be copied or pickled"):
+            copy.copy(self.balls)
+
     def test_what_is_refused(self):
         with self.assertRaisesRegex(ValueError, r"points: shape \(3,\) \(wanted \(count, 3\)\)"):
             self.balls.nearest([1, 2, 3])
@@ -131,6 +137,21 @@ class Cameras(unittest.TestCase):
         with self.assertRaisesRegex(AttributeError, "centre"):
             camera.centre = (1, 2, 3)
 
+    def test_copies_have_their_own_memory(self):
+        camera = a_camera()
+        for made in (copy.copy(camera), copy.deepcopy(camera)):
+            made.center[2] = 7
+            self.assertEqual((made.width, made.params.tolist()), (40, camera.params.tolist()))
+            self.assertNotEqual(camera.center[2], 7)
+
+    def test_one_focal_length_keeps_the_shape(self):
+        camera = gbtrace.Camera("SIMPLE_RADIAL", 640, 480, (500, 320, 240, 0.1))
+        for width, height in ((320, 240), (213, 160)):
+            self.assertEqual(camera.resized(width, height).width, width)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "SIMPLE_RADIAL has one focal length, 640 x 480 pixels cannot become 512 x 512"):
+            camera.resized(512, 512)
+        self.assertEqual(a_camera().resized(512, 512).height, 512)
+
     def test_moved_and_back(self):
         camera, motion = a_camera(), np.array([0.1, 0.2, 0.3, 0.1, -0.2, 0.05])
         moved = camera.moved(motion)
@@ -170,6 +191,8 @@ class Cameras(unittest.TestCase):
         self.assertEqual(a_camera().resized(np.int64(20), 15).width, 20)
         with self.assertRaisesRegex(ValueError, "target"):
             a_camera().looking_at((0, 0, 0), (0, 0, 0))
+        with self.assertRaisesRegex(ValueError, "a value is not finite"):
+            a_camera().looking_at((0, 0, np.nan), (0, 0, 0))
         with self.assertRaisesRegex(ValueError, "gaussians: 4294967296"):
             gbtrace.export("RUN", "scene.ply", gaussians=2**32)
         for threads in (0, 2**32):
@@ -187,6 +210,26 @@ class Trained(unittest.TestCase):
         self.assertTrue(all(low < high for low, high in zip(info.low, info.high)))
         self.assertTrue(any(v.held_out for v in views) and not all(v.held_out for v in views))
         self.assertEqual([v.name for v in views], sorted(v.name for v in views))
+        self.assertTrue(all(0 < v.t_near <= self.model.settings.t_near for v in views))
+
+    def test_no_copies(self):
+        with self.assertRaisesRegex(TypeError, "a gbtrace.Model cannot be copied or pickled"):
+            copy.copy(self.model)
+
+    def test_an_interrupted_close_frees_once(self):
+        handles = []
+
+        def interrupted(handle):
+            handles.append(handle.value)
+            raise KeyboardInterrupt
+
+        model = gbtrace.Model(MODEL)
+        with unittest.mock.patch.object(_library.library, "gbt_model_close", interrupted):
+            with self.assertRaises(KeyboardInterrupt):
+                model.close()
+            del model
+        self.assertEqual(len(handles), 1)
+        _library.library.gbt_model_close(handles[0])
 
     def test_arrays_are_written_in_place(self):
         camera = self.model.views()[0].camera
@@ -224,7 +267,9 @@ class Trained(unittest.TestCase):
             self.model.gradient(picture, gaussians=True)
         with self.assertRaisesRegex(gbtrace.ArgumentError, "finite"):
             self.model.gradient(picture * np.nan)
-        self.model.gradient(picture)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "networks"):
+            self.model.gaussians()
+        self.assertEqual(self.model.gradient(picture, gaussians=False).shape, (6,))
         with self.assertRaisesRegex(gbtrace.ArgumentError, "keep"):
             self.model.gradient(picture)
         with self.assertRaisesRegex(gbtrace.ArgumentError, "camera"):
@@ -296,6 +341,17 @@ class Plain(unittest.TestCase):
         np.testing.assert_array_equal(mean, gradient.mean)
         np.testing.assert_array_equal(again, pose)
 
+    def test_gaussians_can_be_had(self):
+        g = some_gaussians()
+        model, camera = gbtrace.Model.from_gaussians(*g), a_camera()
+        picture, got = model.render(camera), model.gaussians()
+        np.testing.assert_allclose(got.quat, g.quat / np.linalg.norm(g.quat, axis=1, keepdims=True), atol=1e-6)
+        np.testing.assert_allclose(got.mean, g.mean, atol=1e-6)
+        for name in ("scale_log", "opacity", "sh"):
+            np.testing.assert_array_equal(getattr(got, name), getattr(g, name))
+        model.set_gaussians(*got)
+        np.testing.assert_allclose(model.render(camera), picture, atol=0.01)
+
     def test_descent_brings_the_picture_nearer(self):
         g, camera = some_gaussians(), a_camera()
         model = gbtrace.Model.from_gaussians(*g)
@@ -356,6 +412,12 @@ class Runs(unittest.TestCase):
     def test_train(self):
         model = gbtrace.train(os.environ["GBT_DATA"], SCRATCH / "run", iterations=3, downscale=2, grow=False)
         self.assertEqual(model.info.iterations, 3)
+
+    def test_a_stopped_training_is_resumed(self):
+        run = SCRATCH / "stopped"
+        with self.assertRaises(KeyboardInterrupt):
+            gbtrace.train(os.environ["GBT_DATA"], run, iterations=5, stop_at_step=2)
+        self.assertEqual(gbtrace.train(None, run, resume=True).info.iterations, 5)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ static gbt_status make(gbt_model **out, gbt_error *err)
 static gbt_status opened(gbt_model *m, gbt_status status, gbt_model **out)
 {
     m->run.frame.draw.renderer = GBT_RENDERER_TRACE;
+    m->settings = m->run.settings;
     *out = status == GBT_OK ? m : NULL;
     if (status != GBT_OK)
         gbt_model_close(m);
@@ -103,7 +104,8 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
         const double length = sqrt(square);
         if (!(length >= 1e-18))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "gaussians: quat of Gaussian %zu has length %g (wanted > 0)", i, length);
+                             "gaussians: quat of Gaussian %zu has length %g (wanted 1e-18 or more)", i,
+                             length);
         quat_length[i] = (float)length;
         for (size_t k = 0; k < 4; k++)
             cloud->quat[4 * i + k] = (float)((double)q[k] / length);
@@ -152,6 +154,25 @@ gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt
     return opened(m, gbt_model_set_gaussians(m, g, err), out);
 }
 
+gbt_status gbt_model_get_gaussians(const gbt_model *m, float *mean, float *scale_log, float *quat,
+                                   float *opacity, float *sh, gbt_error *err)
+{
+    const gaussian_cloud *c = &m->run.cloud;
+    const size_t n = c->count, width = 3 * (size_t)((c->sh_degree + 1) * (c->sh_degree + 1));
+    if (n == 0)
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "model: networks make its Gaussians for each view (wanted plain ones: export it first)");
+    for (size_t i = 0; i < 3 * n && mean != NULL; i++)
+        mean[i] = (float)((double)c->mean[i] + m->run.model.origin[i % 3]);
+    copy_floats(c->scale_log, 3 * n, scale_log);
+    copy_floats(c->quat, 4 * n, quat);
+    copy_floats(c->opacity, n, opacity);
+    for (size_t i = 0; i < n && sh != NULL; i++)
+        copy_floats(c->sh + i * GAUSSIAN_SH_COUNT * 3, width, sh + i * width);
+    return GBT_OK;
+}
+
 /* ---- questions ---- */
 
 gbt_model_info gbt_model_get_info(const gbt_model *m)
@@ -179,7 +200,7 @@ gbt_model_info gbt_model_get_info(const gbt_model *m)
 
 gbt_model_settings gbt_model_get_settings(const gbt_model *m)
 {
-    const trace_settings *s = &m->run.settings;
+    const trace_settings *s = &m->settings;
     return (gbt_model_settings){.background = {s->background[0], s->background[1], s->background[2]},
                                 .footprint = m->run.frame.draw.footprint,
                                 .t_near = s->t_near,
@@ -204,7 +225,7 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
         if (!(*ranges[k].values >= ranges[k].low && *ranges[k].values <= ranges[k].high))
             return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name,
                              (double)*ranges[k].values, (double)ranges[k].low, (double)ranges[k].high);
-    trace_settings *s = &m->run.settings;
+    trace_settings *s = &m->settings;
     if (memcmp(s->background, g->background, sizeof s->background) != 0)
         s->sky.varies = false;
     memcpy(s->background, g->background, sizeof s->background);
@@ -236,8 +257,10 @@ gbt_status gbt_model_get_view(const gbt_model *m, size_t index, gbt_model_view *
         return base_fail(err, GBT_ERR_ARGUMENT, "view %zu: there are %zu open", index,
                          r->photos.source == NULL ? 0 : r->scene.view_count);
     const scene_view *view = &r->scene.views[index];
-    *out = (gbt_model_view){
-        .name = view->name, .held_out = view->is_test, .camera = photos_camera(&r->photos, index, 0)};
+    *out = (gbt_model_view){.name = view->name,
+                            .held_out = view->is_test,
+                            .camera = photos_camera(&r->photos, index, 0),
+                            .t_near = loaded_run_settings(r, index).t_near};
     for (int k = 0; k < 3; k++)
         out->camera.center[k] += r->model.origin[k];
     return GBT_OK;

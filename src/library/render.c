@@ -20,7 +20,7 @@ gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, bool keep, c
     gbt_camera local = *camera;
     for (int k = 0; k < 3; k++)
         local.center[k] -= r->model.origin[k];
-    GBT_TRY(frame_prepare(f, loaded_run_subject(r), &local, &r->settings, err));
+    GBT_TRY(frame_prepare(f, loaded_run_subject(r), &local, &m->settings, err));
     /* the caller's own, written in place */
     image rgb = {.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb};
     const trace_outputs outputs = {.rgb = &rgb, .depth = out->depth, .transmittance = out->transmittance};
@@ -39,12 +39,6 @@ static gbt_status reserve_gradient(gbt_model *m, gbt_error *err)
     mem_free(m->d_mean);
     m->d_mean = mem_alloc(count, 3 * sizeof *m->d_mean, "gradient", err);
     return m->d_mean == NULL ? GBT_ERR_NO_MEMORY : gaussian_cloud_alloc(&m->gradient, count, err);
-}
-
-static void hand_out(const float *from, size_t count, float *to)
-{
-    if (to != NULL)
-        memcpy(to, from, count * sizeof *to);
 }
 
 /* A scale that was raised (gaussian_limit_scales()) is a part of the largest one. */
@@ -77,12 +71,12 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
             g->quat[4 * i + k] /= m->quat_length[i];
     for (size_t i = 0; i < n && m->raised != NULL; i++)
         give_to_largest(cloud->scale_log + 3 * i, m->raised[i], g->scale_log + 3 * i);
-    hand_out(m->d_mean, 3 * n, out->mean);
-    hand_out(g->scale_log, 3 * n, out->scale_log);
-    hand_out(g->quat, 4 * n, out->quat);
-    hand_out(g->opacity, n, out->opacity);
+    copy_floats(m->d_mean, 3 * n, out->mean);
+    copy_floats(g->scale_log, 3 * n, out->scale_log);
+    copy_floats(g->quat, 4 * n, out->quat);
+    copy_floats(g->opacity, n, out->opacity);
     for (size_t i = 0; i < n && out->sh != NULL; i++)
-        hand_out(g->sh + i * GAUSSIAN_SH_COUNT * 3, width, out->sh + i * width);
+        copy_floats(g->sh + i * GAUSSIAN_SH_COUNT * 3, width, out->sh + i * width);
     return GBT_OK;
 }
 

@@ -202,8 +202,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
     if (data == NULL && is_plain(out) && !has_data && file_exists(cameras)) {
         GBT_TRY(cameras_json_load(cameras, &out->scene, err));
-        out->def.downscale = 1; /* what cfg_args says is of the data set's photos */
-        return place_views(downscale, out, err);
+        /* cfg_args says by what the data set's photos are divided, not these pictures */
+        return place_views(downscale > 0 ? downscale : 1, out, err);
     }
     if (data == NULL && is_plain(out) && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,

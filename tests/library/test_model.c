@@ -2,10 +2,15 @@
 /* tests/library/test_model.c -- models in memory: what is refused, what can be asked, where pictures go. */
 #include "test_support.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/image.h"
+#include "gbtrace/evaluate.h"
 #include "gbtrace/make_scene.h"
 #include "gbtrace/model.h"
+#include "gbtrace/train.h"
+#include "remove_tree.h"
 
 enum { W = 9, H = 7, COUNT = 2 };
 
@@ -119,20 +124,26 @@ static void what_can_be_asked(void **state)
     gbt_model_close(model);
 }
 
+/* Small photos. */
+static void make_data(const char *folder, int width, int view_count)
+{
+    gbt_make_scene_def def = gbt_make_scene_def_default();
+    def.width = width;
+    def.height = 3 * width / 4;
+    def.view_count = view_count;
+    def.samples = 1;
+    def.points = 150;
+    assert_ok(gbt_make_scene(&def, folder, NULL));
+}
+
 /* Cameras stay where they are in the world when the Gaussians are others. */
 static void views_stay_with_other_gaussians(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/gbt_views_XXXXXX", data[64], command[128];
+    char folder[] = "/tmp/gbt_views_XXXXXX", data[64];
     assert_non_null(mkdtemp(folder));
     snprintf(data, sizeof data, "%s/data", folder);
-    gbt_make_scene_def def = gbt_make_scene_def_default();
-    def.width = 16;
-    def.height = 12;
-    def.view_count = 4;
-    def.samples = 1;
-    def.points = 50;
-    assert_ok(gbt_make_scene(&def, data, NULL));
+    make_data(data, 16, 4);
     gbt_model *model = made();
     size_t count;
     assert_ok(gbt_model_open_views(model, data, &count, NULL));
@@ -149,8 +160,193 @@ static void views_stay_with_other_gaussians(void **state)
     for (int k = 0; k < 3; k++)
         assert_true(fabs(before.camera.center[k] - after.camera.center[k]) < 1e-12);
     gbt_model_close(model);
-    snprintf(command, sizeof command, "rm -r %s", folder);
-    assert_int_equal(system(command), 0);
+    assert_int_equal(remove_tree(folder), 0);
+}
+
+static void write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* Quaternions of length 2, opacities as logits. The second row is not usable, the third out of view. */
+static const char of_a_file[] = "ply\nformat ascii 1.0\ncomment gbtrace near 2\nelement vertex 3\n"
+                                "property float x\nproperty float y\nproperty float z\n"
+                                "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n"
+                                "property float opacity\n"
+                                "property float scale_0\nproperty float scale_1\nproperty float scale_2\n"
+                                "property float rot_0\nproperty float rot_1\nproperty float rot_2\n"
+                                "property float rot_3\nend_header\n"
+                                "0.25 0 5  1 0.5 0.25  0.5  0.75 0.25 0.5  1 1 1 1\n"
+                                "nan 0 5  0 0 0  0.5  0 0 0  1 0 0 0\n"
+                                "1 2 -9  0 0 0  -1  -2 -2 -2  0 2 0 0\n";
+
+/* What a file's Gaussians became can be had, shows the same, and is what gradients are of. */
+static void gaussians_of_a_file(void **state)
+{
+    (void)state;
+    enum { CLASSES = 5, WIDEST = 4, VALUES = 3 * W * H };
+    static const int widths[CLASSES] = {3, 3, 4, 1, 3};
+    static const float wanted[CLASSES][WIDEST * COUNT] = {{0.25f, 0, 5, 1, 2, -9},
+                                                          {0.75f, 0.25f, 0.5f, -2, -2, -2},
+                                                          {0.5f, 0.5f, 0.5f, 0.5f, 0, 1, 0, 0},
+                                                          {0.62245933f, 0.26894142f},
+                                                          {1, 0.5f, 0.25f, 0, 0, 0}};
+    static float of_file[VALUES], of_arrays[VALUES], d_rgb[VALUES];
+    float values[CLASSES][WIDEST * COUNT], d[CLASSES][WIDEST * COUNT];
+    char path[] = "/tmp/gbt_model_XXXXXX.ply";
+    close(mkstemps(path, 4));
+    write_text(path, of_a_file);
+    gbt_model *file, *arrays;
+    assert_ok(gbt_model_open(path, &file, NULL));
+    unlink(path);
+    assert_int_equal(gbt_model_get_info(file).gaussians, COUNT);
+    assert_ok(gbt_model_get_gaussians(file, NULL, NULL, NULL, NULL, NULL, NULL));
+    assert_ok(gbt_model_get_gaussians(file, values[0], values[1], values[2], values[3], values[4], NULL));
+    for (int c = 0; c < CLASSES; c++)
+        for (int i = 0; i < widths[c] * COUNT; i++)
+            assert_true(fabsf(values[c][i] - wanted[c][i]) < 1e-6f);
+    const gbt_gaussians g = {COUNT, 0, values[0], values[1], values[2], values[3], values[4]};
+    const gbt_model_settings settings = gbt_model_get_settings(file);
+    assert_true(settings.t_near == 2);
+    assert_ok(gbt_model_from_gaussians(&g, &arrays, NULL));
+    assert_ok(gbt_model_set_settings(arrays, &settings, NULL));
+    assert_ok(gbt_model_render(file, &camera, 1, &(gbt_picture){.rgb = of_file}, NULL));
+    assert_ok(gbt_model_render(arrays, &camera, 0, &(gbt_picture){.rgb = of_arrays}, NULL));
+    assert_memory_equal(of_file, of_arrays, sizeof of_file);
+    for (int i = 0; i < VALUES; i++)
+        d_rgb[i] = (float)(i % 7);
+    assert_ok(
+        gbt_model_gradient(file, d_rgb, NULL, &(gbt_gaussians_gradient){d[0], d[1], d[2], d[3], d[4]}, NULL));
+    for (int c = 0; c < CLASSES; c++) {
+        double largest = 0;
+        for (int k = 0; k < widths[c]; k++)
+            largest = fmax(largest, fabs((double)d[c][k]));
+        assert_true(largest > 1);
+        for (int k = 0; k < widths[c]; k++) {
+            const float before = values[c][k], step = 0.01f;
+            double sum[2] = {0, 0};
+            for (int side = 0; side < 2; side++) {
+                values[c][k] = side == 0 ? before + step : before - step;
+                assert_ok(gbt_model_set_gaussians(arrays, &g, NULL));
+                assert_ok(gbt_model_render(arrays, &camera, 0, &(gbt_picture){.rgb = of_arrays}, NULL));
+                for (int i = 0; i < VALUES; i++)
+                    sum[side] += (double)d_rgb[i] * (double)of_arrays[i];
+            }
+            values[c][k] = before;
+            const double slope = (sum[0] - sum[1]) / (2 * (double)step);
+            if (!(fabs(slope - (double)d[c][k]) < 0.01 * largest))
+                fail_msg("array %d, value %d: %g, by differences %g", c, k, (double)d[c][k], slope);
+        }
+    }
+    gbt_model_close(file);
+    gbt_model_close(arrays);
+}
+
+/* Of a result folder: its cameras.json, and a data set whose photos are divided as cfg_args says. Which were
+   open before does not matter. */
+static void views_do_not_depend_on_those_before(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/gbt_views_XXXXXX", data[64], path[128];
+    assert_non_null(mkdtemp(folder));
+    snprintf(data, sizeof data, "%s/data", folder);
+    make_data(data, 32, 4);
+    snprintf(path, sizeof path, "%s/cfg_args", folder);
+    write_text(path, "Namespace(source_path='/nowhere', resolution=2, white_background=True)");
+    snprintf(path, sizeof path, "%s/cameras.json", folder);
+    write_text(path,
+               "[{\"id\": 0, \"img_name\": \"0\", \"width\": 40, \"height\": 30, \"fx\": 30, \"fy\": 30,"
+               " \"position\": [0, 0, 0], \"rotation\": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]");
+    snprintf(path, sizeof path, "%s/point_cloud", folder);
+    assert_int_equal(mkdir(path, 0777), 0);
+    snprintf(path, sizeof path, "%s/point_cloud/iteration_7", folder);
+    assert_int_equal(mkdir(path, 0777), 0);
+    snprintf(path, sizeof path, "%s/point_cloud/iteration_7/point_cloud.ply", folder);
+    write_text(path, of_a_file);
+    gbt_model *model;
+    assert_ok(gbt_model_open(folder, &model, NULL));
+    const gbt_model_settings settings = gbt_model_get_settings(model);
+    assert_true(settings.background[1] == 1);
+    const char *const from[] = {data, NULL, data};
+    const int widths[] = {16, 40, 16};
+    for (int i = 0; i < 3; i++) {
+        size_t count;
+        gbt_model_view view;
+        assert_ok(gbt_model_open_views(model, from[i], &count, NULL));
+        assert_ok(gbt_model_get_view(model, 0, &view, NULL));
+        assert_int_equal(view.camera.width, widths[i]);
+    }
+    gbt_model_close(model);
+    assert_int_equal(remove_tree(folder), 0);
+}
+
+/* The first photo of a COLMAP model is taken from a third of its distance to the world's origin. */
+static void bring_nearer(const char *data)
+{
+    enum { AT = 8 + 4 + 4 * 8 }; /* behind the count, its number and its rotation */
+    char path[128];
+    double translation[3];
+    snprintf(path, sizeof path, "%s/sparse/0/images.bin", data);
+    FILE *file = fopen(path, "r+b");
+    assert_non_null(file);
+    assert_int_equal(fseek(file, AT, SEEK_SET), 0);
+    assert_int_equal(fread(translation, sizeof translation, 1, file), 1);
+    for (int k = 0; k < 3; k++)
+        translation[k] /= 3;
+    assert_int_equal(fseek(file, AT, SEEK_SET), 0);
+    assert_int_equal(fwrite(translation, sizeof translation, 1, file), 1);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* A photo from nearby has a near distance of its own, and with it the picture that gbt_render() makes. */
+static void a_close_up_looks_as_in_training(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/gbt_near_XXXXXX", data[64], run[64], out[64], path[256];
+    assert_non_null(mkdtemp(folder));
+    snprintf(data, sizeof data, "%s/data", folder);
+    snprintf(run, sizeof run, "%s/run", folder);
+    snprintf(out, sizeof out, "%s/out", folder);
+    make_data(data, 48, 24);
+    bring_nearer(data);
+    gbt_train_def def = gbt_train_def_default();
+    def.iterations = 20;
+    assert_ok(gbt_train(data, run, &def, NULL));
+    gbt_render_def render = gbt_render_def_default();
+    render.split = GBT_SPLIT_ALL;
+    assert_ok(gbt_render(run, out, &render, NULL));
+    gbt_model *model;
+    gbt_model_view near, other, again;
+    size_t count;
+    assert_ok(gbt_model_open(run, &model, NULL));
+    assert_ok(gbt_model_open_views(model, NULL, &count, NULL));
+    assert_ok(gbt_model_get_view(model, 0, &near, NULL));
+    assert_ok(gbt_model_get_view(model, 1, &other, NULL));
+    gbt_model_settings settings = gbt_model_get_settings(model);
+    assert_true(near.t_near > 0 && near.t_near < 0.8f * other.t_near && near.t_near < settings.t_near);
+    settings.t_near = near.t_near;
+    assert_ok(gbt_model_set_settings(model, &settings, NULL));
+    assert_ok(gbt_model_get_view(model, 1, &again, NULL));
+    assert_true(again.t_near == other.t_near);
+    const size_t values = 3 * (size_t)near.camera.width * (size_t)near.camera.height;
+    float *rgb = malloc(values * sizeof *rgb);
+    image png;
+    assert_ok(gbt_model_render(model, &near.camera, 0, &(gbt_picture){.rgb = rgb}, NULL));
+    snprintf(path, sizeof path, "%s/%s", out, near.name);
+    assert_ok(image_read(path, &png, NULL));
+    assert_int_equal(3 * (size_t)png.width * (size_t)png.height, values);
+    for (size_t i = 0; i < values; i++)
+        assert_true(fabsf(fminf(fmaxf(rgb[i], 0), 1) - png.pixels[i]) < 1.0f / 255);
+    image_free(&png);
+    free(rgb);
+    gbt_error err = {0};
+    assert_refused(gbt_model_get_gaussians(model, NULL, NULL, NULL, NULL, NULL, &err), &err, GBT_ERR_ARGUMENT,
+                   "networks");
+    gbt_model_close(model);
+    assert_int_equal(remove_tree(folder), 0);
 }
 
 static void settings_are_checked(void **state)
@@ -327,6 +523,9 @@ int main(void)
                                        cmocka_unit_test(gaussians_that_are_refused),
                                        cmocka_unit_test(what_can_be_asked),
                                        cmocka_unit_test(views_stay_with_other_gaussians),
+                                       cmocka_unit_test(gaussians_of_a_file),
+                                       cmocka_unit_test(views_do_not_depend_on_those_before),
+                                       cmocka_unit_test(a_close_up_looks_as_in_training),
                                        cmocka_unit_test(settings_are_checked),
                                        cmocka_unit_test(pictures_go_where_they_should),
                                        cmocka_unit_test(one_far_from_the_others),

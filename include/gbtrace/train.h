@@ -184,6 +184,10 @@ void gbt_set_threads(int threads);
  */
 gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err);
 
+/** The most memory that the process has taken since its program started, bytes; 0 where nobody says.
+    Threads: any. */
+size_t gbt_peak_memory(void);
+
 /**
  * For the start of a program: `end` is called, on any thread, when an allocation fails inside a library
  * that leaves no way back (OpenImageIO, oneTBB, jansson). It must end the process. Without this such a

@@ -118,8 +118,8 @@ static run_clock clock_start(const trainer *t, save_beside *saving)
 /* A run that took more than it may ends, saved: with more memory it goes on. */
 static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_error *err)
 {
-    const size_t peak = mem_peak_bytes();
-    if (t->def.memory == 0 || peak <= t->def.memory)
+    const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
+    if (peak <= t->def.memory)
         return GBT_OK;
     GBT_TRY(save_all(t, paths, err));
     return base_fail(

@@ -96,6 +96,8 @@ static void what_it_takes(void **state)
     assert_true(small.least > small.program && small.whole >= small.least);
     assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least &&
                 fine.photos < large.photos);
+    const memory_need found = memory_need_of(&s, 1); /* points are, in smaller photos that are all held */
+    assert_true(found.decoding >= (VIEWS - 2) * 16.0 * 48 * 36);
     for (size_t i = 0; i < s.view_count; i++)
         s.views[i].photo_width = 100 * s.views[i].camera.width; /* as stored: 17 megapixels */
     const memory_need stored = memory_need_of(&s, 1);

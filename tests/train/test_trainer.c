@@ -769,6 +769,22 @@ static void points_are_made_where_there_are_none(void **state)
                 memcmp(made[0].position, made[2].position, 3 * made[0].count * sizeof(float)) != 0);
     for (size_t i = 0; i < 3 * made[0].count; i++)
         assert_true(isfinite(made[0].position[i]) && made[0].color[i] >= 0 && made[0].color[i] <= 1);
+    /* Of twice as many views as may be, every second one is read: the others are not there. */
+    enum { MANY = 2 * SEED_VIEWS_MOST, ABSENT = VIEWS - 1 };
+    static size_t many[MANY];
+    for (size_t i = 0; i < MANY; i++)
+        many[i] = i % 2 == 0 ? i / 2 % ABSENT : ABSENT;
+    char *path = s.views[ABSENT].path;
+    s.views[ABSENT].path = (char *)in_root("absent.png");
+    scene_points of_many = {0};
+    photos p;
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    assert_ok(seed_points_make(&p, many, MANY, 5, &of_many, NULL));
+    photos_close(&p);
+    s.views[ABSENT].path = path;
+    assert_true(of_many.count >= 100);
+    mem_free(of_many.position);
+    mem_free(of_many.color);
     for (int i = 0; i < 3; i++) {
         mem_free(made[i].position);
         mem_free(made[i].color);

@@ -129,6 +129,16 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
  */
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
 
+/**
+ * Keep every gbt_train() out of the folder `run`, as each keeps the others out: for what follows a training.
+ * Until gbt_release_run(), or the end of the process.
+ *
+ * @param hold [out] for gbt_release_run(); unchanged after a failure
+ * @return GBT_OK, or GBT_ERR_IO: somebody else has it, or it is no folder
+ */
+gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err);
+void gbt_release_run(int hold);
+
 /* ---- the settings as a table, for programs that read them from people ---- */
 
 typedef enum gbt_setting_kind {

@@ -35,6 +35,13 @@ gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
     return bytes > 0 ? paged_start(folder, bytes / 8 * 5, err) : GBT_OK; /* the rest is for what must stay */
 }
 
+gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err)
+{
+    return file_lock_folder(run, hold, err);
+}
+
+void gbt_release_run(int hold) { file_unlock_folder(hold); }
+
 /* ---- the run's folder ---- */
 
 static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
@@ -194,7 +201,7 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
-    if (def->memory > 0)
+    if (def->memory > 0 && !cluster_leads()) /* which has done so already */
         GBT_TRY(gbt_set_memory(def->memory, run, err));
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
@@ -280,7 +287,9 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     if (opened)
         status = file_lock_folder(run, &lock, err);
     const bool locked = opened && status == GBT_OK;
-    if (locked && def->resume)
+    if (locked && def->memory > 0)
+        status = gbt_set_memory(def->memory, run, err);
+    if (locked && status == GBT_OK && def->resume) /* reads checkpoints */
         status = resume_mend(paths.checkpoint, paths.checkpoint_previous, err);
     status = cluster_follow(status, err);
     if (status == GBT_OK)

@@ -135,6 +135,7 @@ gbt_status gbt_train_with(const char *data, const char *run, const char *setting
  *
  * @param hold [out] for gbt_release_run(); unchanged after a failure
  * @return GBT_OK, or GBT_ERR_IO: somebody else has it, or it is no folder
+ * Threads: any.
  */
 gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err);
 void gbt_release_run(int hold);

@@ -77,7 +77,9 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
                          "%.1000s: holds a run already (go on with it by `resume`, name another folder, or "
                          "lose it by `overwrite`)",
                          run);
-    return file_make_folder(checkpoints, err);
+    GBT_TRY(file_make_folder(checkpoints, err));
+    GBT_TRY(file_check_folder_creatable(run, err));
+    return file_check_folder_creatable(checkpoints, err);
 }
 
 /* ---- the loop ---- */

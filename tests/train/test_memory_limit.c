@@ -115,7 +115,12 @@ static void what_it_takes(void **state)
     assert_true(stored.least * 3 / 8 >= photos_decoded_bytes(&s)); /* what is above the 5/8 that memory is let
                                                                       go of to */
     for (size_t i = 0; i < s.view_count; i++)
+        s.views[i].is_exr = true;
+    assert_true(fabs(photos_decoded_bytes(&s) - 40.0 * 4800 * 3600) < 1);
+    for (size_t i = 0; i < s.view_count; i++) {
+        s.views[i].is_exr = false;
         s.views[i].has_alpha = true;
+    }
     const memory_need clear = memory_need_of(&s, 1);
     assert_true(fabs(clear.photos - 4.0 / 3 * stored.photos) < 1);
     assert_int_equal(photos_at_once(&s, (size_t)(24.0 * 4800 * 3600 * 2)), 1);

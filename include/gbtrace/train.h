@@ -129,6 +129,17 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
  */
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
 
+/**
+ * Keep every gbt_train() out of the folder `run`, as each keeps the others out: for what follows a training.
+ * Until gbt_release_run(), or the end of the process.
+ *
+ * @param hold [out] for gbt_release_run(); unchanged after a failure
+ * @return GBT_OK, or GBT_ERR_IO: somebody else has it, or it is no folder
+ * Threads: any.
+ */
+gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err);
+void gbt_release_run(int hold);
+
 /* ---- the settings as a table, for programs that read them from people ---- */
 
 typedef enum gbt_setting_kind {
@@ -183,6 +194,10 @@ void gbt_set_threads(int threads);
  * @return GBT_OK, or GBT_ERR_IO when no file can be made there
  */
 gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err);
+
+/** The most memory that the process has taken since its program started, bytes; 0 where nobody says.
+    Threads: any. */
+size_t gbt_peak_memory(void);
 
 /**
  * For the start of a program: `end` is called, on any thread, when an allocation fails inside a library

@@ -44,7 +44,8 @@ void mem_free(void *pointer); /* NULL is fine */
 /** Test only: the n-th allocation from now fails (0 = the next one); a negative n switches this off. */
 void mem_fail_after(long n);
 
-/** Highest resident memory of the process so far, bytes. */
+/** Highest resident memory of the process since its program started, bytes. Some 20 microseconds. Threads:
+    any. */
 size_t mem_peak_bytes(void);
 
 #endif

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -16,14 +17,20 @@
 #include "base/fail.h"
 #include "base/unnamed_file.h"
 
-enum { MAPPINGS_MOST = 512, PAGE_LEAST = 4096 };
+enum {
+    MAPPINGS_MOST = 1 << 15, /* half of what Linux gives a process (vm.max_map_count) */
+    PAGE_LEAST = 4096
+};
 
-static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-static struct {
+typedef struct mapping {
     void *start;
     size_t bytes;
-} mappings[MAPPINGS_MOST];           /* a free place has no start */
-static atomic_size_t mapping_end;    /* no mapping from here on */
+} mapping;
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static mapping *mappings; /* by `start` */
+static size_t mapping_capacity;
+static atomic_size_t mapping_count;
 static atomic_size_t resident_limit; /* 0: not started */
 static atomic_size_t let_go_above;   /* the limit; or, where what stays is more, that and a little */
 static char place[4096];
@@ -60,42 +67,75 @@ static gbt_status map_file(size_t bytes, const char *what, void **out, gbt_error
     return GBT_OK;
 }
 
+/* Where the mapping from `start` on is in their list, or would be. */
+static size_t place_of(const void *start)
+{
+    size_t low = 0, high = atomic_load(&mapping_count);
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if ((uintptr_t)mappings[middle].start < (uintptr_t)start)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Not by mem_reserve(), which would come here. */
+static bool reserve_one(void)
+{
+    if (atomic_load(&mapping_count) < mapping_capacity)
+        return true;
+    const size_t capacity = 2 * mapping_capacity + 64;
+    mapping *more = realloc(mappings, capacity * sizeof *more);
+    if (more == NULL)
+        return false;
+    mappings = more;
+    mapping_capacity = capacity;
+    return true;
+}
+
+static gbt_status map_one(size_t bytes, const char *what, void **out, gbt_error *err)
+{
+    const size_t count = atomic_load(&mapping_count);
+    if (count >= MAPPINGS_MOST)
+        return GBT_OK;
+    if (!reserve_one())
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
+    GBT_TRY(map_file(bytes, what, out, err));
+    const size_t at = place_of(*out);
+    memmove(mappings + at + 1, mappings + at, (count - at) * sizeof *mappings);
+    mappings[at] = (mapping){*out, bytes};
+    atomic_store(&mapping_count, count + 1);
+    return GBT_OK;
+}
+
 gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err)
 {
-    gbt_status status = GBT_OK;
     *out = NULL;
     if (atomic_load_explicit(&resident_limit, memory_order_relaxed) == 0 || bytes < PAGED_LEAST_BYTES)
         return GBT_OK;
     pthread_mutex_lock(&lock);
-    size_t at = 0;
-    while (at < MAPPINGS_MOST && mappings[at].start != NULL)
-        at++;
-    if (at < MAPPINGS_MOST) {
-        status = map_file(bytes, what, out, err);
-        mappings[at].start = *out;
-        mappings[at].bytes = bytes;
-        if (at >= atomic_load(&mapping_end))
-            atomic_store(&mapping_end, at + 1);
-    }
+    const gbt_status status = map_one(bytes, what, out, err);
     pthread_mutex_unlock(&lock);
     return status;
 }
 
 bool paged_unmap(void *pointer)
 {
-    if (atomic_load_explicit(&mapping_end, memory_order_relaxed) == 0 || (uintptr_t)pointer % PAGE_LEAST != 0)
+    if (pointer == NULL || atomic_load_explicit(&mapping_count, memory_order_relaxed) == 0 ||
+        (uintptr_t)pointer % PAGE_LEAST != 0)
         return false;
     pthread_mutex_lock(&lock);
-    size_t at = 0;
-    const size_t end = atomic_load(&mapping_end);
-    while (at < end && (mappings[at].start != pointer || pointer == NULL))
-        at++;
-    if (at < end) {
+    const size_t at = place_of(pointer), count = atomic_load(&mapping_count);
+    const bool found = at < count && mappings[at].start == pointer;
+    if (found) {
         munmap(pointer, mappings[at].bytes);
-        mappings[at].start = NULL;
+        memmove(mappings + at, mappings + at + 1, (count - at - 1) * sizeof *mappings);
+        atomic_store(&mapping_count, count - 1);
     }
     pthread_mutex_unlock(&lock);
-    return at < end;
+    return found;
 }
 
 /* Where more than the limit cannot be let go of, to ask for it at every turn would only cost time. */
@@ -105,9 +145,8 @@ void paged_check(void)
     if (limit == 0 || mem_resident_bytes() <= atomic_load_explicit(&let_go_above, memory_order_relaxed))
         return;
     pthread_mutex_lock(&lock);
-    for (size_t i = 0; i < atomic_load(&mapping_end); i++)
-        if (mappings[i].start != NULL)
-            madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* of a shared file: values stay */
+    for (size_t i = 0; i < atomic_load(&mapping_count); i++)
+        madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* of a shared file: values stay */
     const size_t stays = mem_resident_bytes() + limit / 16;
     atomic_store(&let_go_above, stays > limit ? stays : limit);
     pthread_mutex_unlock(&lock);

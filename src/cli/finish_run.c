@@ -6,14 +6,20 @@
 
 #include "cli/command.h"
 #include "cli/progress.h"
+#include "gbtrace/cluster.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/progress.h"
+#include "gbtrace/train.h"
 
 gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
 {
     char model[4096];
-    gbt_status status = GBT_OK;
+    int hold = 0;
+    const bool holds = gbt_cluster_rank() == 0;
+    gbt_status status = holds ? gbt_hold_run(run, &hold, err) : GBT_OK;
+    if (status != GBT_OK)
+        return status;
     if (snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
         gbt_compress_def small = gbt_compress_def_default();
         small.unless_lossless = true;
@@ -21,7 +27,11 @@ gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
     }
     gbt_evaluate_def score = gbt_evaluate_def_default();
     score.tensorboard = tensorboard;
-    return status == GBT_OK ? gbt_evaluate(run, &score, err) : status;
+    if (status == GBT_OK)
+        status = gbt_evaluate(run, &score, err);
+    if (holds)
+        gbt_release_run(hold);
+    return status;
 }
 
 void finish_run_say(const char *run)

@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
 
 #include "cli/progress.h"
+#include "gbtrace/train.h"
 
 enum { GO_ON = -1, TABLE_MAX = OPTIONS_MAX + OPTIONS_COMMON };
 
@@ -17,12 +17,12 @@ size_t options_memory;
 
 gbt_status options_memory_kept(size_t limit, gbt_error *err)
 {
-    struct rusage used;
-    if (limit == 0 || getrusage(RUSAGE_SELF, &used) != 0 || (size_t)used.ru_maxrss * 1024 <= limit)
+    const size_t peak = gbt_peak_memory();
+    if (limit == 0 || peak <= limit)
         return GBT_OK;
     err->status = GBT_ERR_NO_MEMORY;
-    snprintf(err->text, sizeof err->text, "memory: %zu MiB is too little: this took %ld (all is done)",
-             limit >> 20, (used.ru_maxrss >> 10) + 1);
+    snprintf(err->text, sizeof err->text, "memory: %zu MiB is too little: this took %zu (all is done)",
+             limit >> 20, (peak >> 20) + 1);
     return err->status;
 }
 

@@ -88,6 +88,7 @@ static void check_view(photo_check *c, scene_view *view)
         c->with_alpha += h.has_alpha;
         view->photo_width = h.width;
         view->has_alpha = h.has_alpha;
+        view->is_exr = h.kind == IMAGE_EXR;
         c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
         c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
         c->max_width = h.width > c->max_width ? h.width : c->max_width;

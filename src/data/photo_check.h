@@ -22,7 +22,7 @@ typedef struct photo_check {
     gbt_error refused; /* the first reason for which training would refuse one; status GBT_OK: none */
 } photo_check;
 
-/** Sets photo_width and has_alpha of the views. Cost: a few reads per photo. */
+/** Sets photo_width, has_alpha and is_exr of the views. Cost: a few reads per photo. */
 void photo_check_all(scene *s, photo_check *out);
 
 /** A warning, each in one line, for photos that are turned and for tiny ones. */

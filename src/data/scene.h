@@ -24,6 +24,7 @@ typedef struct scene_view {
     gbt_alpha alpha;   /* see scene_set_alpha() */
     int photo_width;   /* as the photo's header says; 0: not read (photo_check_all()), or unreadable */
     bool has_alpha;    /* likewise: the photo has an alpha channel */
+    bool is_exr;       /* likewise: of floats */
     gbt_camera camera; /* pose in scene-local coordinates; width and height as the data set states them */
     bool is_test;      /* held out */
     size_t rank; /* place in the sorted list of all views that the data set names, those without a photo too

@@ -6,6 +6,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "io/container_format.h"
 
 /* A fuzzer finds no checksum, and what is behind it must hold without. */
@@ -128,6 +129,7 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
     size_t end = sizeof h + table_bytes;
     for (size_t i = 0; i < h.section_count && status == GBT_OK; i++) {
         status = check_row(bytes, byte_count, path, i, &end, &sections[i], err);
+        paged_check();
         for (size_t j = 0; j < i && status == GBT_OK; j++)
             if (strcmp(sections[j].name, sections[i].name) == 0)
                 status =

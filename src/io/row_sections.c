@@ -3,9 +3,9 @@
 #include "io/row_sections.h"
 
 #include <stdio.h>
-#include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 
 void row_sections_add(container_writer *w, const char *prefix, const row_field *fields, int field_count,
                       size_t count, size_t offset_count, float *const *arrays)
@@ -41,6 +41,6 @@ gbt_status row_sections_get(const container *c, const char *prefix, const row_fi
     const void *data[ROWS_FIELDS_MAX];
     GBT_TRY(row_sections_find(c, prefix, fields, field_count, &count, &offset_count, data, err));
     for (int f = 0; f < field_count && count > 0; f++)
-        memcpy(arrays[f], data[f], count * row_field_width(&fields[f], (int)offset_count) * sizeof(float));
+        mem_copy(arrays[f], data[f], count * row_field_width(&fields[f], (int)offset_count) * sizeof(float));
     return GBT_OK;
 }

@@ -213,20 +213,19 @@ static gbt_status render_frames(studio *st, const camera_path *path, const char 
     return GBT_OK;
 }
 
-/* The frames that all processes have drawn last go to the first one. `all`: room for `count` of them. */
-static void collect_frames(const image *own, size_t count, image *all)
+/* The frame that process `from` has drawn last goes to the first one. */
+static void collect_frame(const image *own, size_t from, image *out)
 {
     size_t send[CLUSTER_SIZE_MAX] = {0}, receive[CLUSTER_SIZE_MAX] = {0};
     const size_t values = 3 * (size_t)own->width * (size_t)own->height, rank = (size_t)gbt_cluster_rank();
-    send[0] = rank < count ? values : 0;
-    for (size_t r = 0; rank == 0 && r < count; r++)
-        receive[r] = values;
-    cluster_exchange(own->pixels, send, all->pixels, receive);
+    send[0] = rank == from ? values : 0;
+    receive[from] = rank == 0 ? values : 0;
+    cluster_exchange(own->pixels, send, out->pixels, receive);
 }
 
 /* A film is written in its order by the first process; in each round every process draws a frame, or all draw
-   one. `all`: room for a frame of every process. */
-static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *all,
+   one. `picture`: room for a frame. */
+static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *picture,
                               const gbt_render_def *def, gbt_error *err)
 {
     const size_t size = st->together ? 1 : (size_t)gbt_cluster_size();
@@ -236,15 +235,10 @@ static gbt_status film_rounds(studio *st, const camera_path *path, video *film, 
         const size_t count = path->count - first < size ? path->count - first : size;
         gbt_status status = rank < count ? draw(st, &path->shots[first + rank], def, err) : GBT_OK;
         GBT_TRY(cluster_agree(status, err));
-        const image *own = &st->run.frame.rgb;
-        collect_frames(own, count, all);
-        for (size_t i = 0; film != NULL && i < count && status == GBT_OK; i++) {
-            const int height = path->shots[0].camera.height;
-            const image picture = {.width = own->width,
-                                   .height = height,
-                                   .channels = 3,
-                                   .pixels = all->pixels + i * 3 * (size_t)own->width * (size_t)height};
-            status = video_add(film, &picture, err);
+        for (size_t i = 0; i < count; i++) {
+            collect_frame(&st->run.frame.rgb, i, picture);
+            if (film != NULL && status == GBT_OK)
+                status = video_add(film, picture, err);
         }
         GBT_TRY(cluster_follow(status, err));
         log_count("render", first + count, path->count, (double)NAN);
@@ -257,17 +251,17 @@ static gbt_status make_film(studio *st, const camera_path *path, const char *out
 {
     const gbt_camera *camera = &path->shots[0].camera;
     video *film = NULL;
-    image all = {0};
+    image picture = {0};
     gbt_status status = GBT_OK;
     if (cluster_leads()) {
         status = video_open(out, camera->width, camera->height, path->fps, &film, err);
         if (status == GBT_OK)
-            status = image_alloc(&all, camera->width, camera->height * gbt_cluster_size(), 3, err);
+            status = image_alloc(&picture, camera->width, camera->height, 3, err);
     }
     status = cluster_follow(status, err);
     if (status == GBT_OK)
-        status = film_rounds(st, path, film, &all, def, err);
-    image_free(&all);
+        status = film_rounds(st, path, film, &picture, def, err);
+    image_free(&picture);
     const gbt_status closed = video_close(film, status == GBT_OK, err);
     return status == GBT_OK ? cluster_follow(closed, err) : status;
 }

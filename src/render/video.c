@@ -28,8 +28,9 @@ static const struct {
       "-f", "mp4"}},
     {".webm",
      {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", "-f", "webm"}},
-    {".gif",
-     {"-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse", "-loop", "0", "-f", "gif"}},
+    {".gif", /* colours for each picture: ffmpeg would keep a whole film to find colours for all */
+     {"-filter_complex", "[0:v]split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1",
+      "-loop", "0", "-f", "gif"}},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 

@@ -15,7 +15,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { LANES = 8, WIDEN_BLOCK = 512 /* a multiple of LANES */ };
+enum { LANES = FOOTPRINT_LANES, WIDEN_BLOCK = 512 /* a multiple of LANES */ };
 
 typedef double d8 __attribute__((vector_size(LANES * sizeof(double))));
 typedef float f8 __attribute__((vector_size(LANES * sizeof(float))));
@@ -122,12 +122,22 @@ LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_po
     return pixel * t * ahead * root;
 }
 
+void footprint_pixels(const footprint_view *view, double point[3][LANES], double pixel[LANES])
+{
+    d8 at[3], dir[3], unused[3];
+    memcpy(at, point, sizeof at);
+    const d8 distance = look(view, at, dir), there = pixel_at(view, distance, dir, unused);
+    memcpy(pixel, &there, sizeof there);
+}
+
 double footprint_pixel(const footprint_view *view, const double point[3])
 {
-    const d8 at[3] = {d8_set(point[0]), d8_set(point[1]), d8_set(point[2])};
-    d8 dir[3], unused[3];
-    const d8 distance = look(view, at, dir);
-    return pixel_at(view, distance, dir, unused)[0];
+    double at[3][LANES], pixel[LANES];
+    for (int k = 0; k < 3; k++)
+        for (int lane = 0; lane < LANES; lane++)
+            at[k][lane] = point[k];
+    footprint_pixels(view, at, pixel);
+    return pixel[0];
 }
 
 /* ---- widening ---- */

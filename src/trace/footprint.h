@@ -41,6 +41,12 @@ footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *
     perspective camera. */
 double footprint_pixel(const footprint_view *view, const double point[3]);
 
+enum { FOOTPRINT_LANES = 8 };
+
+/** The same of so many points in the time of one. */
+void footprint_pixels(const footprint_view *view, double point[3][FOOTPRINT_LANES],
+                      double pixel[FOOTPRINT_LANES]);
+
 /** One Gaussian, in double; the quaternion is taken as unit. */
 typedef struct footprint_gaussian {
     double mean[3], scale[3], quat[4], opacity;

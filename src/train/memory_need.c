@@ -6,24 +6,30 @@
 
 #include "train/photos.h"
 #include "train/rules.h"
+#include "train/seed_points.h"
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
                     tree_bytes = 100, tree_fixed_bytes = 95, learning_point_bytes = 3000,
                     model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120;
-static const double found_points = 20000, /* by photo consistency, where the data set has none */
-    most_points = 131072;                 /* the tree of balls is 18 deep: more points make no more anchors */
+static const double saved_point_bytes = 952; /* of the copy that a save beside the steps is written from */
+static const double found_points = 20000,    /* by photo consistency, where the data set has none */
+    most_points = 131072; /* the tree of balls is 18 deep: more points make no more anchors */
 
 memory_need memory_need_of(const scene *s, double downscale)
 {
-    double train_bytes = 0, largest = 0;
+    double train_bytes = 0, largest = 0, train_count = 0;
     const double decoded = photos_decoded_bytes(s);
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *v = &s->views[i];
         const double pixels = (double)v->camera.width * (double)v->camera.height / (downscale * downscale);
         largest = fmax(largest, pixels);
+        train_count += !v->is_test;
         train_bytes += v->is_test ? 0 : (3 + (v->mask_path != NULL) + v->has_alpha) * pixels;
     }
+    const double seeding = s->points.count > 0 ? 0
+                                               : fmin(train_count, SEED_VIEWS_MOST) * SEED_PIXEL_BYTES *
+                                                     fmin(largest, (double)SEED_LONG_SIDE * SEED_LONG_SIDE);
     const double points = s->points.count > 0 ? (double)s->points.count : found_points,
                  learning = fmin(points, most_points);
     memory_need need = {
@@ -31,9 +37,9 @@ memory_need memory_need_of(const scene *s, double downscale)
         .reading = (double)s->file_bytes + raw_point_bytes * points,
         .points = point_bytes * points,
         .trees = tree_bytes * points,
-        .decoding = decoded * (double)photos_at_once(s, 0),
+        .decoding = fmax(decoded * (double)photos_at_once(s, 0), decoded + seeding),
         .photos = fmin(train_bytes, (double)PHOTOS_KEPT_BYTES),
-        .anchors = learning_point_bytes * learning,
+        .anchors = (learning_point_bytes + saved_point_bytes) * learning,
         .view = fmax(step_pixel_bytes * fmin(largest, TRAIN_STEP_PIXELS), score_pixel_bytes * largest),
     };
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */

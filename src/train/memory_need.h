@@ -11,11 +11,11 @@ typedef struct memory_need {
     double reading;  /* the data set's files and what is kept of them, while they are read */
     double points;   /* sparse points, for the whole run */
     double trees;    /* over them, at the start */
-    double decoding; /* photos as they are stored, while they are read */
-    double photos, anchors,
-        view;     /* while steps are made: those that are kept; with all that learns; one of them */
-    double whole; /* the largest sum */
-    double least; /* that a limit must leave: what can never be let go of */
+    double decoding; /* photos as they are stored, while they are read; and small, while points are found */
+    double photos, anchors, view; /* while steps are made: those that are kept; all that learns, and its copy
+                                     while it is saved; one of the photos */
+    double whole;                 /* the largest sum */
+    double least;                 /* that a limit must leave: what can never be let go of */
 } memory_need;
 
 /** Of a run with the default settings and photos divided by `downscale` > 0. Within a factor of 1.5 on scenes

@@ -18,8 +18,8 @@
 
 enum { USUAL_WIDTH = 1600 /* as in 3DGS */ };
 /* Of a stored pixel: its floats and its samples, or its floats at two sizes; with alpha or a mask both of
-   these. */
-static const double decoded_pixel_bytes = 24, decoded_alpha_bytes = 40;
+   these. And of an EXR file, whose samples are floats. */
+static const double decoded_pixel_bytes[2] = {24, 40}, decoded_alpha_bytes[2] = {40, 56};
 
 static double median(float *values, size_t count)
 {
@@ -77,9 +77,10 @@ double photos_decoded_bytes(const scene *s)
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *v = &s->views[i];
         const double ratio = v->photo_width > 0 ? (double)v->photo_width / v->camera.width : 1;
-        largest =
-            fmax(largest, (v->has_alpha || v->mask_path != NULL ? decoded_alpha_bytes : decoded_pixel_bytes) *
-                              ratio * ratio * (double)v->camera.width * (double)v->camera.height);
+        const double *bytes =
+            v->has_alpha || v->mask_path != NULL ? decoded_alpha_bytes : decoded_pixel_bytes;
+        largest = fmax(largest,
+                       bytes[v->is_exr] * ratio * ratio * (double)v->camera.width * (double)v->camera.height);
     }
     return largest;
 }

@@ -52,22 +52,27 @@ static bool get_numbers(const json_t *array, size_t count, double *out)
     return fine;
 }
 
-/* By the name that pose_file_write() gave it. */
-static scene_view *find_view(const scene *s, const json_t *name)
+/* By the name that pose_file_write() gave it. `place`: where to look first, which becomes the place behind
+   it: the file mostly has the order of the views. */
+static scene_view *find_view(const scene *s, const json_t *name, size_t *place)
 {
-    scene_view *found = NULL;
-    for (size_t i = 0; found == NULL && i < s->view_count; i++) {
+    for (size_t k = 0; k < s->view_count; k++) {
+        const size_t i = (*place + k) % s->view_count;
         json_t *own = json_text(s->views[i].name);
-        found = json_equal(own, name) ? &s->views[i] : NULL;
+        const bool same = json_equal(own, name);
         json_decref(own);
+        if (same) {
+            *place = i + 1;
+            return &s->views[i];
+        }
     }
-    return found;
+    return NULL;
 }
 
 static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt_error *err)
 {
     const json_t *photos = json_object_get(root, "photos"), *photo;
-    size_t i;
+    size_t i, place = 0;
     if (!json_is_array(photos))
         return base_fail(err, GBT_ERR_FORMAT, "%s: poses of no photos (wanted an array \"photos\")", path);
     json_array_foreach(photos, i, photo)
@@ -78,7 +83,7 @@ static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt
             return base_fail(err, GBT_ERR_FORMAT,
                              "%s: photo %zu: no pose (wanted a rotation of 9 numbers and a center of 3)",
                              path, i);
-        scene_view *view = find_view(s, json_object_get(photo, "name"));
+        scene_view *view = find_view(s, json_object_get(photo, "name"), &place);
         if (view == NULL)
             continue;
         memcpy(view->camera.rotation, rotation, sizeof rotation);

@@ -35,6 +35,13 @@ gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
     return bytes > 0 ? paged_start(folder, bytes / 8 * 5, err) : GBT_OK; /* the rest is for what must stay */
 }
 
+gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err)
+{
+    return file_lock_folder(run, hold, err);
+}
+
+void gbt_release_run(int hold) { file_unlock_folder(hold); }
+
 /* ---- the run's folder ---- */
 
 static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
@@ -70,7 +77,9 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
                          "%.1000s: holds a run already (go on with it by `resume`, name another folder, or "
                          "lose it by `overwrite`)",
                          run);
-    return file_make_folder(checkpoints, err);
+    GBT_TRY(file_make_folder(checkpoints, err));
+    GBT_TRY(file_check_folder_creatable(run, err));
+    return file_check_folder_creatable(checkpoints, err);
 }
 
 /* ---- the loop ---- */
@@ -118,8 +127,8 @@ static run_clock clock_start(const trainer *t, save_beside *saving)
 /* A run that took more than it may ends, saved: with more memory it goes on. */
 static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_error *err)
 {
-    const size_t peak = mem_peak_bytes();
-    if (t->def.memory == 0 || peak <= t->def.memory)
+    const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
+    if (peak <= t->def.memory)
         return GBT_OK;
     GBT_TRY(save_all(t, paths, err));
     return base_fail(
@@ -194,7 +203,7 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
-    if (def->memory > 0)
+    if (def->memory > 0 && !cluster_leads()) /* which has done so already */
         GBT_TRY(gbt_set_memory(def->memory, run, err));
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
@@ -280,7 +289,9 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     if (opened)
         status = file_lock_folder(run, &lock, err);
     const bool locked = opened && status == GBT_OK;
-    if (locked && def->resume)
+    if (locked && def->memory > 0)
+        status = gbt_set_memory(def->memory, run, err);
+    if (locked && status == GBT_OK && def->resume) /* reads checkpoints */
         status = resume_mend(paths.checkpoint, paths.checkpoint_previous, err);
     status = cluster_follow(status, err);
     if (status == GBT_OK)

@@ -25,12 +25,18 @@ static void sampling_block(size_t block, size_t begin, size_t end, void *context
         job->out[i] = INFINITY;
     for (size_t c = 0; c < job->camera_count; c++) {
         const footprint_view view = footprint_view_of(&job->cameras[c]);
-        for (size_t i = begin; i < end; i++) {
-            const float *p = job->a->position + 3 * i;
-            const double point[3] = {(double)p[0], (double)p[1], (double)p[2]};
-            const float pixel = (float)footprint_pixel(&view, point);
-            if (pixel < job->out[i] && camera_sees(&job->cameras[c], p, NULL))
-                job->out[i] = pixel;
+        for (size_t i = begin; i < end; i += FOOTPRINT_LANES) {
+            const size_t count = end - i < FOOTPRINT_LANES ? end - i : FOOTPRINT_LANES;
+            double point[3][FOOTPRINT_LANES] = {{0}}, pixel[FOOTPRINT_LANES];
+            for (size_t lane = 0; lane < count; lane++)
+                for (size_t k = 0; k < 3; k++)
+                    point[k][lane] = (double)job->a->position[3 * (i + lane) + k];
+            footprint_pixels(&view, point, pixel);
+            for (size_t lane = 0; lane < count; lane++) {
+                const float size = (float)pixel[lane], *p = job->a->position + 3 * (i + lane);
+                if (size < job->out[i + lane] && camera_sees(&job->cameras[c], p, NULL))
+                    job->out[i + lane] = size;
+            }
         }
     }
     for (size_t i = begin; i < end; i++)

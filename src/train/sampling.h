@@ -12,7 +12,7 @@
  *
  * @param cameras [in]  [camera_count], at the size at which their photos were compared
  * @param out     [out] [a->count] scene-local units (trace/footprint.h); 0 for anchors that no camera sees
- * Threads: uses all; same bits for every thread count. Cost: about 100 ns per anchor and camera.
+ * Threads: uses all; same bits for every thread count. Cost: less than 100 ns per anchor and camera.
  */
 void sampling_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out);
 

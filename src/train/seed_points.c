@@ -9,6 +9,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
@@ -17,7 +18,6 @@ enum {
     SAMPLES = 40000, /* pixels that are swept */
     KEPT = 20000,
     KEPT_AT_LEAST = 1000, /* so many, however doubtful: a start that is better than none */
-    LONG_SIDE = 400,      /* photos are halved until they are no longer than this */
     NEIGHBORS = 4,
     DEPTHS = 96,
     PATCH = 5, /* pixels, odd */
@@ -302,15 +302,16 @@ static int by_doubt(const void *a, const void *b)
     return x->index < y->index ? -1 : x->index > y->index;
 }
 
-static gbt_status read_views(seeding *s, photos *source, const size_t *views, gbt_error *err)
+static gbt_status read_views(seeding *s, photos *source, const size_t *views, size_t count, gbt_error *err)
 {
     for (size_t i = 0; i < s->view_count; i++) {
         seed_view *v = &s->views[i];
+        const size_t view = views[i * count / s->view_count];
         int level = 0;
-        v->camera = photos_camera(source, views[i], 0);
-        while (v->camera.width > LONG_SIDE || v->camera.height > LONG_SIDE)
-            v->camera = photos_camera(source, views[i], ++level);
-        GBT_TRY(photos_get(source, views[i], level, &v->photo, err));
+        v->camera = photos_camera(source, view, 0);
+        while (v->camera.width > SEED_LONG_SIDE || v->camera.height > SEED_LONG_SIDE)
+            v->camera = photos_camera(source, view, ++level);
+        GBT_TRY(photos_get(source, view, level, &v->photo, err));
         const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;
         v->gray = mem_alloc(pixels, sizeof *v->gray, "seed images", err);
         if (v->gray == NULL)
@@ -319,6 +320,7 @@ static gbt_status read_views(seeding *s, photos *source, const size_t *views, gb
             const float *rgb = v->photo.pixels + 3 * p;
             v->gray[p] = 0.299f * rgb[0] + 0.587f * rgb[1] + 0.114f * rgb[2];
         }
+        paged_check();
     }
     return GBT_OK;
 }
@@ -353,22 +355,22 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
 gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed,
                             scene_points *out, gbt_error *err)
 {
-    seeding s = {.view_count = view_count, .seed = seed};
+    seeding s = {.view_count = view_count < SEED_VIEWS_MOST ? view_count : SEED_VIEWS_MOST, .seed = seed};
     gbt_status status = GBT_ERR_NO_MEMORY;
-    s.views = mem_calloc(view_count, sizeof *s.views, "seed images", err);
+    s.views = mem_calloc(s.view_count, sizeof *s.views, "seed images", err);
     s.out = mem_alloc(SAMPLES, sizeof *s.out, "seed candidates", err);
     if (s.views != NULL && s.out != NULL)
-        status = read_views(&s, source, views, err);
+        status = read_views(&s, source, views, view_count, err);
     if (status == GBT_OK) {
         double focus[3], distance;
-        find_focus(s.views, view_count, focus, &distance);
+        find_focus(s.views, s.view_count, focus, &distance);
         s.near = 0.2 * distance;
         s.far = 6 * distance;
         find_neighbors(&s, distance);
         parallel_blocks(SAMPLES, BLOCK, seed_block, &s);
         status = keep_best(&s, out, err);
     }
-    for (size_t i = 0; s.views != NULL && i < view_count; i++) {
+    for (size_t i = 0; s.views != NULL && i < s.view_count; i++) {
         image_free(&s.views[i].photo);
         mem_free(s.views[i].gray);
     }

@@ -6,10 +6,18 @@
 
 #include "train/photos.h"
 
+enum {
+    SEED_VIEWS_MOST = 512, /* photos that are looked at; of more, so many at even distances in their list */
+    SEED_LONG_SIDE = 400   /* photos are halved until they are no longer than this */
+};
+
+/** Bytes of a pixel of such a photo while points are made. */
+#define SEED_PIXEL_BYTES (4 * sizeof(float))
+
 /**
  * Make points by plane sweep (Collins 1996).
  *
- * Random pixels of the photos (halved until 400 pixels long) are swept through 96 depths around the point
+ * Random pixels of the photos (SEED_VIEWS_MOST, SEED_LONG_SIDE) are swept through 96 depths around the point
  * where the cameras' axes meet; a depth counts by the normalised correlation of 5 x 5 pixels with up to four
  * neighbouring photos, the better half of them. Pixels whose best depth is good and beats all others become
  * points; with few of these, the next best up to 1,000.

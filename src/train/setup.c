@@ -19,20 +19,21 @@
 #include "train/trainer.h"
 #include "train/widest.h"
 
-enum { STREAM_NETWORKS = 2 };
+enum { STREAM_NETWORKS = 2, DISTANCE_VIEWS = 4096 };
 
-/* Distances from training cameras to a sample of the anchors: they decide whether the networks see the
-   distance, its unit, and t_near. */
+/* Distances from training cameras, where there are very many a part of them, to a sample of the anchors: they
+   decide whether the networks see the distance, its unit, and t_near. */
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
-    float *all = mem_alloc(per_view * t->train_count + 1, sizeof *all, "distances", err);
+    const size_t step = t->train_count / DISTANCE_VIEWS + 1, views = (t->train_count + step - 1) / step;
+    float *all = mem_alloc(per_view * views + 1, sizeof *all, "distances", err);
     if (all == NULL)
         return GBT_ERR_NO_MEMORY;
     size_t count = 0;
     /* The first sample that a picture shows; in the last pass, when none does, in any direction. */
     for (size_t pass = 0; pass <= stride && count == 0; pass++)
-        for (size_t v = 0; v < t->train_count; v++) {
+        for (size_t v = 0; v < t->train_count; v += step) {
             const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
             for (size_t i = pass % stride; i < t->anchors.count; i += stride) {
                 double distance;

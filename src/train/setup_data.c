@@ -219,6 +219,11 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
     GBT_TRY(choose_exposure(t, err));
+    for (size_t i = 0; i < t->scene.view_count; i++) { /* tracks, which nobody asks for any more */
+        mem_free(t->scene.views[i].seen);
+        t->scene.views[i].seen = NULL;
+        t->scene.views[i].seen_count = 0;
+    }
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;

@@ -72,19 +72,23 @@ static void folders_that_are_not_there(void **state)
 static void many_arrays(void **state)
 {
     (void)state;
-    enum { MANY = 520 }; /* more than can be mapped: the rest is memory */
+    enum { MANY = 600 };
     static unsigned char *a[MANY];
     assert_ok(paged_start("/tmp", 1, NULL));
     for (int i = 0; i < MANY; i++) {
         a[i] = mem_alloc(PAGED_LEAST_BYTES, 1, "test", NULL);
         assert_non_null(a[i]);
-        a[i][PAGED_LEAST_BYTES - 1] = (unsigned char)i;
+        memset(a[i], i & 255, PAGED_LEAST_BYTES);
     }
+    const size_t before = mem_resident_bytes();
     paged_check();
-    for (int i = 0; i < MANY; i++) {
+    assert_true(mem_resident_bytes() + (MANY - 40) * PAGED_LEAST_BYTES < before); /* all of them are gone */
+    for (int k = 0; k < MANY; k++) {
+        const int i = k * 7 % MANY; /* in no order: 7 and 600 have no common divisor */
         assert_int_equal(a[i][PAGED_LEAST_BYTES - 1], i & 255);
         mem_free(a[i]);
     }
+    assert_false(paged_unmap(a[0]));
     paged_stop();
 }
 

@@ -151,6 +151,10 @@ report $? "compress within a memory limit" "$(cat err out)"
 "$program" query nearest run --at 0,0,0 >free 2>err && "$program" query nearest run --at 0,0,0 --memory 400M >out 2>>err && cmp free out >>err
 report $? "query within a memory limit" "$(cat err out)"
 holds "a limit that is passed" 5 '^error: memory: ' query nearest run --at 0,0,0 --memory 1M
+if command -v perl >/dev/null; then
+    perl -e '$n = 5e8; $much = "x" x $n; exec @ARGV' "$program" info made --memory 400M >out 2>err
+    report $? "a limit does not count what was there before the program" "$(cat err)"
+fi
 holds "query of a data set" 0 '[0-9]' query nearest made --at 0,0,0 --count 3
 printf '<svg xmlns="http://www.w3.org/2000/svg"/>' >chart.svg && "$program" report run ./chart.svg >out 2>err && grep -q 'class="study card"' run/report.html
 report $? "a chart that is named from here" "$(cat err out)"

@@ -196,6 +196,23 @@ outside() {
     "$program" train case/data -o case/run --resume --stop-at-step 1 --threads 1 --quiet >said 2>&1 # the lock is gone
     grep -q 'another process' said && bad "a lock after the end" "it is still there"
 
+    # What follows the last step belongs to the training, too: it waits for whoever reads the scores.
+    prepare
+    mkdir case/late && mkfifo case/late/metrics.json
+    "$program" train case/data -o case/late --iterations 3 --threads 1 --quiet >long 2>&1 &
+    pid=$!
+    runs=$((runs + 1))
+    while [ ! -s case/late/train.json ] && kill -0 $pid 2>/dev/null; do sleep 0.05; done
+    sleep 1
+    "$program" train case/data -o case/late --overwrite --iterations 6 --threads 1 --quiet >said 2>&1
+    code=$?
+    [ $code = 4 ] && [ "$(grep -c '^error: case/late: another process' said)" = 1 ] || bad "a second trainer while the first scores" "exit code $code"
+    timeout 60 cat case/late/metrics.json >scores && [ -s scores ] || kill -KILL $pid
+    wait $pid
+    code=$?
+    cp long said
+    [ $code = 0 ] && [ -s case/late/report.html ] || bad "the first trainer's end" "exit code $code"
+
     prepare
     long_run
     kill -STOP $pid

@@ -87,6 +87,26 @@ static void test_sizes(void **state)
     }
 }
 
+/* Points at once are points one by one. */
+static void test_lanes(void **state)
+{
+    (void)state;
+    static const gbt_camera_model models[] = {GBT_CAMERA_PINHOLE, GBT_CAMERA_ORTHOGRAPHIC,
+                                              GBT_CAMERA_OPENCV_FISHEYE, GBT_CAMERA_EQUIRECTANGULAR};
+    for (size_t m = 0; m < sizeof models / sizeof *models; m++) {
+        const gbt_camera c = camera_of(models[m]);
+        const footprint_view view = footprint_view_of(&c);
+        double point[3][FOOTPRINT_LANES], pixel[FOOTPRINT_LANES];
+        for (uint64_t lane = 0; lane < FOOTPRINT_LANES; lane++)
+            for (uint64_t k = 0; k < 3; k++)
+                point[k][lane] = 5 * rng_normal(m, lane, (uint32_t)k);
+        footprint_pixels(&view, point, pixel);
+        for (int lane = 0; lane < FOOTPRINT_LANES; lane++)
+            assert_true(pixel[lane] ==
+                        footprint_pixel(&view, (double[]){point[0][lane], point[1][lane], point[2][lane]}));
+    }
+}
+
 /* A ball of std-dev s on the axis keeps o s^2; a disc seen flat keeps its area, seen edge-on only its width
    grows. */
 static void test_energy(void **state)
@@ -270,8 +290,9 @@ static void test_arrays(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes),           cmocka_unit_test(test_energy),
-                                       cmocka_unit_test(test_limits),          cmocka_unit_test(test_adjoint),
-                                       cmocka_unit_test(test_mean_over_pixel), cmocka_unit_test(test_arrays)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sizes),   cmocka_unit_test(test_lanes),
+                                       cmocka_unit_test(test_energy),  cmocka_unit_test(test_limits),
+                                       cmocka_unit_test(test_adjoint), cmocka_unit_test(test_mean_over_pixel),
+                                       cmocka_unit_test(test_arrays)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -30,7 +30,8 @@ static int make_large_scene(void *folder)
 typedef struct limited_run {
     const char *data, *run;
     size_t memory;
-    gbt_status wanted;
+    uint64_t iterations;
+    bool resume;
 } limited_run;
 
 static int train(void *context)
@@ -38,18 +39,20 @@ static int train(void *context)
     const limited_run *r = context;
     gbt_error err = {0};
     gbt_train_def def = gbt_train_def_default();
-    def.iterations = 3;
+    def.iterations = r->iterations;
+    def.resume = r->resume;
     def.memory = r->memory;
     const gbt_status status = gbt_train(r->data, r->run, &def, &err);
-    if (status != r->wanted)
+    if (status != GBT_OK)
         fprintf(stderr, "%s: %s\n", r->run, err.text);
-    return status != r->wanted;
+    return status != GBT_OK;
 }
 
-static size_t train_in_child(const char *data, const char *run, size_t memory)
+static size_t train_in_child(const char *data, const char *run, size_t memory, uint64_t iterations,
+                             bool resume)
 {
     int failed;
-    const size_t peak = in_child(train, &(limited_run){data, run, memory, GBT_OK}, &failed);
+    const size_t peak = in_child(train, &(limited_run){data, run, memory, iterations, resume}, &failed);
     assert_int_equal(failed, 0);
     return peak;
 }
@@ -67,10 +70,13 @@ static void the_same_run_in_less_memory(void **state)
     char whole[PATH_SIZE], less[PATH_SIZE];
     snprintf(whole, sizeof whole, "%s", in_root("whole"));
     snprintf(less, sizeof less, "%s", in_root("less"));
-    const size_t without = train_in_child(data, whole, 0), with = train_in_child(data, less, limit);
+    const size_t without = train_in_child(data, whole, 0, 3, false),
+                 with = train_in_child(data, less, limit, 3, false);
     print_message("%zu MB without a limit, %zu with %zu\n", without >> 20, with >> 20, limit >> 20);
     assert_true(without > limit && with <= limit);
     assert_same_file(in_root("whole/model.gbt"), in_root("less/model.gbt"));
+    for (uint64_t steps = 4; steps <= 5; steps++) /* the second time there are two checkpoints */
+        assert_true(train_in_child(data, less, limit, steps, true) <= limit);
 }
 
 /* Before any work, and nothing is left that looks like a run. */
@@ -96,6 +102,8 @@ static void what_it_takes(void **state)
     assert_true(small.least > small.program && small.whole >= small.least);
     assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least &&
                 fine.photos < large.photos);
+    const memory_need found = memory_need_of(&s, 1); /* points are, in smaller photos that are all held */
+    assert_true(found.decoding >= (VIEWS - 2) * 16.0 * 48 * 36);
     for (size_t i = 0; i < s.view_count; i++)
         s.views[i].photo_width = 100 * s.views[i].camera.width; /* as stored: 17 megapixels */
     const memory_need stored = memory_need_of(&s, 1);
@@ -107,7 +115,12 @@ static void what_it_takes(void **state)
     assert_true(stored.least * 3 / 8 >= photos_decoded_bytes(&s)); /* what is above the 5/8 that memory is let
                                                                       go of to */
     for (size_t i = 0; i < s.view_count; i++)
+        s.views[i].is_exr = true;
+    assert_true(fabs(photos_decoded_bytes(&s) - 40.0 * 4800 * 3600) < 1);
+    for (size_t i = 0; i < s.view_count; i++) {
+        s.views[i].is_exr = false;
         s.views[i].has_alpha = true;
+    }
     const memory_need clear = memory_need_of(&s, 1);
     assert_true(fabs(clear.photos - 4.0 / 3 * stored.photos) < 1);
     assert_int_equal(photos_at_once(&s, (size_t)(24.0 * 4800 * 3600 * 2)), 1);

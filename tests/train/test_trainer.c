@@ -769,6 +769,22 @@ static void points_are_made_where_there_are_none(void **state)
                 memcmp(made[0].position, made[2].position, 3 * made[0].count * sizeof(float)) != 0);
     for (size_t i = 0; i < 3 * made[0].count; i++)
         assert_true(isfinite(made[0].position[i]) && made[0].color[i] >= 0 && made[0].color[i] <= 1);
+    /* Of twice as many views as may be, every second one is read: the others are not there. */
+    enum { MANY = 2 * SEED_VIEWS_MOST, ABSENT = VIEWS - 1 };
+    static size_t many[MANY];
+    for (size_t i = 0; i < MANY; i++)
+        many[i] = i % 2 == 0 ? i / 2 % ABSENT : ABSENT;
+    char *path = s.views[ABSENT].path;
+    s.views[ABSENT].path = (char *)in_root("absent.png");
+    scene_points of_many = {0};
+    photos p;
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    assert_ok(seed_points_make(&p, many, MANY, 5, &of_many, NULL));
+    photos_close(&p);
+    s.views[ABSENT].path = path;
+    assert_true(of_many.count >= 100);
+    mem_free(of_many.position);
+    mem_free(of_many.color);
     for (int i = 0; i < 3; i++) {
         mem_free(made[i].position);
         mem_free(made[i].color);
@@ -808,6 +824,13 @@ static void data_without_training_photos_is_refused(void **state)
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
     train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
+    if (geteuid() != 0) { /* who may write everywhere */
+        const char *closed = in_root("closed/checkpoints");
+        assert_ok(file_make_folder(closed, NULL));
+        assert_int_equal(chmod(closed, 0555), 0);
+        train_fails(in_root("nowhere"), in_root("closed"), &def, GBT_ERR_IO, "checkpoints: cannot create");
+        assert_int_equal(chmod(closed, 0755), 0);
+    }
     char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
     snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
     make_tiny_scene(two_lines); /* no run could be opened again that names this */
@@ -1621,14 +1644,16 @@ static void wide_photos_get_a_usual_width(void **state)
     image photo; /* of a smaller copy, whose cameras say the size of the originals */
     assert_ok(image_alloc(&photo, 20, 15, 3, NULL));
     for (int i = 0; i < 3; i++) {
-        views[i].path = (char *)in_root("small.png");
+        views[i].path = (char *)in_root(i == 2 ? "small.exr" : "small.png");
         views[i].camera.width = 100;
     }
     assert_ok(image_write(views[0].path, &photo, NULL));
+    assert_ok(image_write(views[2].path, &photo, NULL));
     image_free(&photo);
     assert_true(usual_downscale(&s, true) == 5 && usual_downscale(&s, false) == 5);
     photo_check check;
     photo_check_all(&s, &check);
+    assert_true(!s.views[0].is_exr && s.views[2].is_exr);
     assert_int_equal(unlink(views[0].path), 0);
     assert_true(usual_downscale(&s, true) == 5); /* headers are read once */
     trainer t;

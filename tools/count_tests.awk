@@ -38,7 +38,7 @@ function close_program() {
 { sub(/^[ \t]*<system-out>/, "") }
 /^\[       OK \] / { ok_lines++; next }
 /^\[  PASSED  \] .*test\(s\)/ { passed += number_before($0); ok_lines = 0; next }
-/^\[  SKIPPED \] .*test\(s\), listed below/ { skipped += number_before($0); next }
+/^\[  SKIPPED \] .*test\(s\), listed/ { skipped += number_before($0); next }
 /^ [0-9]+ FAILED TEST\(S\)/ { failed += number_before($0); next } # failed cases and failed set-ups
 
 END {

@@ -283,8 +283,7 @@ static void a_backdrop_stands_for_the_background(void **state)
     free_world(&w);
 }
 
-/* What is kept has the values that it has among all; what is left out is blended least: the picture changes
-   less than without as many others. */
+/* What is kept has the values that it has among all, and is more of the picture than what is left out. */
 static void the_most_blended_are_kept(void **state)
 {
     (void)state;
@@ -299,6 +298,9 @@ static void the_most_blended_are_kept(void **state)
     assert_int_equal(some.thinned, all.cloud.count - def.count_max);
     assert_int_equal(some.unseen, all.unseen);
     size_t from = 0, left_out = 0;
+    gaussian_cloud others;
+    assert_ok(gaussian_cloud_alloc(&others, some.thinned, NULL));
+    others.sh_degree = all.cloud.sh_degree;
     for (size_t i = 0; i < all.cloud.count; i++) {
         if (from < some.cloud.count &&
             memcmp(all.cloud.mean + 3 * i, some.cloud.mean + 3 * from, 3 * sizeof(float)) == 0) {
@@ -307,10 +309,17 @@ static void the_most_blended_are_kept(void **state)
             from++;
             continue;
         }
-        left_out++;
+        assert_true(left_out < some.thinned);
+        memcpy(others.mean + 3 * left_out, all.cloud.mean + 3 * i, 3 * sizeof(float));
+        memcpy(others.scale_log + 3 * left_out, all.cloud.scale_log + 3 * i, 3 * sizeof(float));
+        memcpy(others.quat + 4 * left_out, all.cloud.quat + 4 * i, 4 * sizeof(float));
+        memcpy(others.sh + 48 * left_out, all.cloud.sh + 48 * i, 48 * sizeof(float));
+        others.opacity[left_out++] = all.cloud.opacity[i];
     }
     assert_int_equal(from, some.cloud.count);
     assert_int_equal(left_out, some.thinned);
+    assert_true(likeness(&w, &some.cloud) > likeness(&w, &others));
+    gaussian_cloud_free(&others);
     gaussian_cloud_free(&all.cloud);
     gaussian_cloud_free(&some.cloud);
     free_world(&w);

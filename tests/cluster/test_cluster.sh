@@ -124,11 +124,13 @@ code=$?
 [ $code = 4 ] && [ "$(errors)" = 1 ]
 report $? "a failure to render is told once" "code $code: $(cat out err)"
 
-# ---- studies
-"$program" study anchors data -o study1 --iterations 20 --seeds 1 --quiet >out 2>&1 && on 2 "$program" study anchors data -o study2 --iterations 20 --seeds 1 --quiet >out 2>&1 &&
-    (cd study1 && find runs -name model.gbt | sort | xargs sha256sum) >one && (cd study2 && find runs -name model.gbt | sort | xargs sha256sum) >two && [ -s one ] && cmp one two &&
-    [ -s study2/anchors.json ]
-report $? "a study by 2 processes" "$(cat out; diff one two)"
+# ---- studies: of sixteen trainings, so by one of the two MPIs
+if [ "$mpi" = openmpi ] || ! command -v mpirun.openmpi >/dev/null; then
+    "$program" study anchors data -o study1 --iterations 20 --seeds 1 --quiet >out 2>&1 && on 2 "$program" study anchors data -o study2 --iterations 20 --seeds 1 --quiet >out 2>&1 &&
+        (cd study1 && find runs -name model.gbt | sort | xargs sha256sum) >one && (cd study2 && find runs -name model.gbt | sort | xargs sha256sum) >two && [ -s one ] && cmp one two &&
+        [ -s study2/anchors.json ]
+    report $? "a study by 2 processes" "$(cat out; diff one two)"
+fi
 
 # ---- commands that do not share their work
 on 2 "$program" info run2/model.gbt >out 2>&1 && [ "$(grep -c '^  size ' out)" = 1 ]

@@ -108,6 +108,12 @@ END
 count "summary on the first line" 0 run "0 7 passed, 0 failed, 0 skipped" <<'END'
 [  PASSED  ] 7 test(s).
 END
+count "what scripts report" 8 fail "1 1 passed, 1 failed, 2 skipped" <<END
+$(. "$source/tests/cli/report.sh" && report 0 x && report 1 y "" && skip z why && skip w why && finish)
+END
+count "a script that skips all" 0 run "0 0 passed, 0 failed, 1 skipped" <<END
+$(. "$source/tests/cli/report.sh" && skip x why && finish)
+END
 count "a program without cases" 0 run "0 1 passed, 0 failed, 0 skipped" </dev/null
 count "a program that skips itself" 0 "notrun skip" "0 0 passed, 0 failed, 1 skipped" </dev/null
 count "a program that was not built" 8 "notrun lost" "1 0 passed, 1 failed, 0 skipped" </dev/null

@@ -126,6 +126,33 @@ static void masked_pixels_have_no_say(void **state)
     }
 }
 
+static void darken_left(image *photo, size_t view)
+{
+    (void)view;
+    for (int y = 0; y < photo->height; y++)
+        for (int i = 0; i < photo->channels * (photo->width / 2); i++)
+            photo->pixels[photo->channels * photo->width * y + i] *= 0.5f;
+}
+
+/* With exposures the left halves are for the matrix alone. */
+static void fitted_scores_are_of_the_right_halves(void **state)
+{
+    (void)state;
+    double psnr[2], fitted[2];
+    gbt_train_def def = run_def();
+    def.exposure = true;
+    make_tiny_scene(in_root("halves"));
+    train_ok(in_root("halves"), in_root("halves_run"), &def);
+    for (int i = 0; i < 2; i++) {
+        json_t *metrics = scores_of(in_root("halves_run"));
+        psnr[i] = json_real_value(json_object_get(metrics, "psnr"));
+        fitted[i] = json_real_value(json_object_get(metrics, "psnr_fitted"));
+        json_decref(metrics);
+        change_photos(in_root("halves"), darken_left);
+    }
+    assert_true(fitted[0] > 0 && fitted[0] == fitted[1] && psnr[0] != psnr[1]);
+}
+
 /* ---- pixels without a ray ---- */
 
 /* A lens that folds inside the picture: nearly two thirds of its pixels have no ray. */
@@ -221,8 +248,8 @@ static void a_black_mask_leaves_nothing(void **state)
     json_t *metrics = scores_of(in_root("black_run"));
     assert_true(json_is_null(json_object_get(json_array_get(json_object_get(metrics, "views"), 0), "psnr")));
     assert_true(json_real_value(json_object_get(metrics, "psnr")) > 5);
-    static const char *const scores[] = {"psnr", "ssim", "flip"}; /* means over the views that have some */
-    for (int k = 0; k < 3; k++) {
+    static const char *const scores[] = {"psnr", "psnr_fitted", "ssim", "flip"};
+    for (int k = 0; k < 4; k++) { /* means over the views that have some */
         double sum = 0, count = 0;
         const json_t *view;
         size_t i;
@@ -449,11 +476,53 @@ static void transparent_parts_lie_on_the_colour_asked_for(void **state)
     scene_free(&s);
 }
 
+/* Late in a run the colour changes from step to step: photos lie on what the scene is drawn on, as their
+   exposure shows it. */
+static void steps_lay_photos_on_their_background(void **state)
+{
+    (void)state;
+    const char *folder = in_root("steps");
+    make_tiny_scene(folder);
+    change_photos(folder, cut_out);
+    for (int exposure = 0; exposure < 2; exposure++) {
+        gbt_train_def def = run_def();
+        def.start_level = 0;
+        def.exposure = exposure;
+        trainer t;
+        int laid = 0;
+        open_ok(&t, folder, &def);
+        for (size_t i = 0; i < t.exposures.count * AFFINE_NUMBERS; i++)
+            t.exposures.matrix[i] = (float[]){0.5f, 0.1f, 0, 0.2f}[i % 4];
+        for (t.step = 3 * STEPS / 4; t.step < STEPS; t.step++) {
+            step_view *v = &t.views[0];
+            step_photos_pick(&t);
+            step_view_pick(&t, v, 0);
+            assert_int_equal(v->outcome.status, GBT_OK);
+            const float *b = v->background;
+            if (memcmp(b, t.settings.background, sizeof v->background) == 0)
+                continue;
+            laid++;
+            image stored;
+            assert_ok(image_read(t.scene.views[t.train_views[v->slot]].path, &stored, NULL));
+            for (int i = 0; i < 3 * stored.width * stored.height; i++) {
+                const float alpha = stored.pixels[4 * (i / 3) + 3],
+                            behind = exposure ? 0.5f * b[0] + 0.1f * b[1] + 0.2f : b[i % 3],
+                            wanted = alpha * stored.pixels[4 * (i / 3) + i % 3] + (1 - alpha) * behind;
+                assert_true(fabsf(v->photo.pixels[i] - wanted) < 1.1f / 255);
+            }
+            image_free(&stored);
+        }
+        assert_true(laid > 0);
+        trainer_free(&t);
+    }
+}
+
 int main(void)
 {
     be_quiet();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(masked_pixels_have_no_say),
+        cmocka_unit_test(fitted_scores_are_of_the_right_halves),
         cmocka_unit_test(pixels_without_a_ray_have_no_say),
         cmocka_unit_test(a_black_mask_leaves_nothing),
         cmocka_unit_test(black_masks_alone_are_refused),
@@ -461,6 +530,7 @@ int main(void)
         cmocka_unit_test(alpha_is_what_it_is_said_to_be),
         cmocka_unit_test(a_sky_that_is_not_learned_is_told),
         cmocka_unit_test(transparent_parts_lie_on_the_colour_asked_for),
+        cmocka_unit_test(steps_lay_photos_on_their_background),
     };
     return cmocka_run_group_tests_name("masks", tests, make_root, remove_root);
 }

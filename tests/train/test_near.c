@@ -34,8 +34,41 @@ static void a_close_up_is_alone(void **state)
     assert_true(near == 0);
 }
 
+/* A step draws its photo from that one's near distance on: as if all had it, and not from that of all. */
+static void a_step_has_the_near_distance_of_its_photo(void **state)
+{
+    (void)state;
+    static const struct {
+        float of_all;
+        double nearest;
+    } cases[] = {{0.25f, 0}, {100, 0.5}, {100, 0}};
+    static float drawn[3][3 * 48 * 36];
+    trainer t;
+    const gbt_train_def def = run_def();
+    open_ok(&t, tiny, &def);
+    assert_true(def.near == 0.5);
+    step_view *v = &t.views[0];
+    step_photos_pick(&t);
+    for (int i = 0; i < 3; i++) {
+        step_view_pick(&t, v, 0);
+        t.settings.t_near = cases[i].of_all;
+        t.scene.views[t.train_views[v->slot]].nearest = cases[i].nearest;
+        step_view_run(&t, v);
+        if (v->outcome.status != GBT_OK || v->outcome.bad)
+            fail_msg("%s", v->outcome.text);
+        assert_true(v->frame.rgb.width == 48 && v->frame.rgb.height == 36);
+        memcpy(drawn[i], v->frame.rgb.pixels, sizeof drawn[i]);
+    }
+    assert_memory_equal(drawn[0], drawn[1], sizeof drawn[0]);
+    assert_true(memcmp(drawn[1], drawn[2], sizeof drawn[1]) != 0);
+    trainer_free(&t);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_close_up_is_alone)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_close_up_is_alone),
+        cmocka_unit_test(a_step_has_the_near_distance_of_its_photo),
+    };
+    return cmocka_run_group_tests(tests, make_root, remove_root);
 }

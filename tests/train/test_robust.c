@@ -895,6 +895,21 @@ static void exposure_is_learned(void **state)
     json_decref(file);
 }
 
+/* Whoever opens a run has its sky and its poses. */
+static void sky_and_poses_are_scored(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.find_exposure = false;
+    def.iterations = 200;
+    def.footprint = 0; /* no smallest pixels, of which only eval knows */
+    def.background = GBT_BACKGROUND_SKY;
+    score_of(in_root("sky"), tiny, def);
+    def.background = GBT_BACKGROUND_CONSTANT;
+    def.refine_poses = true;
+    score_of(in_root("refined"), tiny, def);
+}
+
 /* Interrupted or not, one thread or three. */
 static void exposure_resumes_to_the_same_bits(void **state)
 {
@@ -985,6 +1000,7 @@ int main(void)
         cmocka_unit_test(wild_rates_and_photos_leave_no_nan),
         cmocka_unit_test(exposures_stay_centred),
         cmocka_unit_test(exposure_is_learned),
+        cmocka_unit_test(sky_and_poses_are_scored),
         cmocka_unit_test(exposure_resumes_to_the_same_bits),
         cmocka_unit_test(making_small_stops_at_a_signal),
         cmocka_unit_test(scoring_stops_at_a_signal),

@@ -124,6 +124,93 @@ static void moments_forget_by_views(void **state)
     assert_true(four.correct_m == one.correct_m && four.correct_v == one.correct_v);
 }
 
+/* Adam's first step is one rate long. With V views a step is sqrt(V) of those of one view, what photos have
+   of their own is as in V steps, and a run of n steps is as long as one of V n. */
+static void rates_follow_the_views(void **state)
+{
+    (void)state;
+    enum { V = 4, LENGTH = 4000 };
+    gbt_train_def def = run_def();
+    def.views = V;
+    def.iterations = LENGTH;
+    def.grow = false;
+    def.exposure = def.refine_poses = true;
+    trainer t;
+    step_report r;
+    open_ok(&t, tiny, &def);
+    for (t.step = LENGTH / 2; t.step * V % t.train_count != 0;) /* an epoch begins: V photos */
+        t.step++;
+    const double progress = pace_progress(&t.pace, t.step), step = 1.0 / (V * LENGTH);
+    const learning_rates rates = learning_rates_at(progress, true, t.rules.geometry_from, t.extent, 2,
+                                                   schedule_rate_end(V * LENGTH), V);
+    const size_t offsets = t.anchors.count * 3 * (size_t)t.anchors.offset_count, scales = t.anchors.count * 6;
+    float *offset = mem_alloc(offsets, sizeof *offset, "test", NULL),
+          *scale = mem_alloc(scales, sizeof *scale, "test", NULL);
+    memcpy(offset, t.anchors.offset, offsets * sizeof *offset);
+    memcpy(scale, t.anchors.scale_log, scales * sizeof *scale);
+    step_ok(&t, &r);
+    double way[4] = {0};
+    for (size_t i = 0; i < offsets; i++)
+        way[0] = fmax(way[0], fabs((double)t.anchors.offset[i] - (double)offset[i]));
+    for (size_t i = 0; i < scales; i++) /* upward: a limit may move them down */
+        way[1] = fmax(way[1], (double)t.anchors.scale_log[i] - (double)scale[i]);
+    bool seen[VIEWS] = {false};
+    for (int i = 0; i < V; i++)
+        seen[t.slots[i]] = true;
+    size_t other = 0; /* moved only by what holds the mean of all */
+    while (seen[other])
+        other++;
+    assert_true(other < t.train_count);
+    const float *a = t.exposures.matrix + t.slots[0] * AFFINE_NUMBERS,
+                *b = t.exposures.matrix + other * AFFINE_NUMBERS;
+    for (int k = 0; k < AFFINE_NUMBERS; k++)
+        way[2] = fmax(way[2], fabs((double)a[k] - (double)b[k]));
+    const size_t views[2] = {t.train_views[t.slots[0]], t.train_views[other]};
+    double move[2][3];
+    for (int k = 0; k < 6; k++)
+        move[k / 3][k % 3] =
+            t.scene.views[views[k / 3]].camera.center[k % 3] - t.poses.given[views[k / 3]].center[k % 3];
+    for (int k = 0; k < 3; k++)
+        way[3] += (move[0][k] - move[1][k]) * (move[0][k] - move[1][k]) / 3;
+    way[3] = sqrt(way[3]) / t.poses.unit;
+    const double wanted[4] = {rates.anchor[ANCHOR_OFFSET], rates.anchor[ANCHOR_SCALE_LOG],
+                              exposures_rate(t.train_count, progress, step),
+                              poses_rate(t.train_count, progress, step)};
+    for (int i = 0; i < 4; i++)
+        if (!(fabs(way[i] / wanted[i] - 1) < 0.01))
+            fail_msg("%d: moved by %g, wanted %g", i, way[i], wanted[i]);
+    mem_free(offset);
+    mem_free(scale);
+    trainer_free(&t);
+}
+
+/* A round judges by views: 40 of them since the one before, in a run of 16,000. */
+static void rounds_count_views(void **state)
+{
+    (void)state;
+    static const struct {
+        float visits, importance;
+        bool stays;
+    } cases[] = {{24, 0, true}, {33, 5e-7f, false}, {33, 9e-7f, true}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        gbt_train_def def = run_def();
+        def.views = 4;
+        def.iterations = 4000;
+        trainer t;
+        open_ok(&t, tiny, &def);
+        t.round_step = 390;
+        t.step = 399;
+        const size_t n = t.anchors.count;
+        for (size_t i = 0; i < n; i++) {
+            t.stats.visit_count[i] = t.stats.shown_count[i] = cases[c].visits;
+            t.stats.importance_accum[i] = cases[c].visits * cases[c].importance;
+        }
+        assert_ok(growing_round(&t, NULL));
+        assert_int_equal(t.anchors.count, cases[c].stays ? n : 1); /* one stays always */
+        trainer_free(&t);
+    }
+}
+
 static void views_are_a_power_of_two(void **state)
 {
     (void)state;
@@ -142,6 +229,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(photos_come_in_the_same_order), cmocka_unit_test(a_step_learns_from_the_mean),
         cmocka_unit_test(threads_do_not_matter),         cmocka_unit_test(moments_forget_by_views),
+        cmocka_unit_test(rates_follow_the_views),        cmocka_unit_test(rounds_count_views),
         cmocka_unit_test(views_are_a_power_of_two),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);

@@ -24,6 +24,7 @@
 #include "train/budget.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/save.h"
 #include "train/seed_points.h"
 #include "train/step_size.h"
 
@@ -155,6 +156,50 @@ static void resumes_from_a_save_beside_the_steps(void **state)
     assert_int_equal(remove(in_root("beside/model.gbt")), 0);
     resume_ok(in_root("beside"));
     assert_same_file(straight_run(), in_root("beside/model.gbt"));
+}
+
+/* What steps change beside the anchors is the copy's own. */
+static void a_save_has_its_own_exposures_and_poses(void **state)
+{
+    (void)state;
+    static save_beside save;
+    static run_paths paths;
+    trainer t;
+    step_report r;
+    gbt_train_def def = run_def();
+    def.exposure = def.refine_poses = true;
+    open_ok(&t, tiny, &def);
+    for (int i = 0; i < 2; i++)
+        step_ok(&t, &r);
+    snprintf(paths.checkpoint, sizeof paths.checkpoint, "%s", in_root("copy.checkpoint"));
+    snprintf(paths.exposure, sizeof paths.exposure, "%s", in_root("copy.exposure.json"));
+    snprintf(paths.poses, sizeof paths.poses, "%s", in_root("copy.poses.json"));
+    snprintf(paths.model, sizeof paths.model, "%s", in_root("copy.gbt"));
+    assert_ok(save_begin(&save, &t, &paths, NULL));
+    const exposures *e = &t.exposures, *e2 = &save.copy.exposures;
+    const poses *p = &t.poses, *p2 = &save.copy.poses;
+    const size_t matrices = e->count * AFFINE_NUMBERS * sizeof(float),
+                 motions = p->count * POSE_NUMBERS * sizeof(float);
+    const struct {
+        const void *own, *copied;
+        size_t bytes;
+    } arrays[] = {
+        {e->matrix, e2->matrix, matrices},
+        {e->moment1, e2->moment1, matrices},
+        {e->moment2, e2->moment2, matrices},
+        {e->visits, e2->visits, e->count * sizeof *e->visits},
+        {p->moment1, p2->moment1, motions},
+        {p->moment2, p2->moment2, motions},
+        {p->visits, p2->visits, p->count * sizeof *p->visits},
+        {t.scene.views, save.copy.scene.views, t.scene.view_count * sizeof *t.scene.views},
+    };
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        assert_true(arrays[i].own != NULL && arrays[i].own != arrays[i].copied);
+        assert_memory_equal(arrays[i].own, arrays[i].copied, arrays[i].bytes);
+    }
+    assert_true(p->packed != p2->packed); /* which is written only now */
+    assert_ok(save_finish(&save, NULL));
+    trainer_free(&t);
 }
 
 static void killed_and_resumed_is_straight(void **state)
@@ -1532,6 +1577,92 @@ static void parts_make_up_the_photo(void **state)
     scene_free(&s);
 }
 
+/* The pixels of `part` are those of `whole` from (x0, y0) on, `apart` pixels from each other. */
+static bool is_from(const image *part, const image *whole, int x0, int y0, int apart)
+{
+    for (int y = 0; y < part->height; y++)
+        for (int x = 0; x < part->width; x++)
+            if (memcmp(part->pixels + 3 * (y * part->width + x),
+                       whole->pixels + 3 * ((y0 + apart * y) * whole->width + x0 + apart * x),
+                       3 * sizeof(float)) != 0)
+                return false;
+    return true;
+}
+
+static step_view *pick_ok(trainer *t)
+{
+    step_photos_pick(t);
+    step_view_pick(t, &t->views[0], 0);
+    if (t->views[0].outcome.status != GBT_OK)
+        fail_msg("%s", t->views[0].outcome.text);
+    return &t->views[0];
+}
+
+/* Of a photo that is too large for a step, each part once in as many epochs as there are parts. */
+static void every_part_has_its_turn(void **state)
+{
+    (void)state;
+    trainer t;
+    image whole = {0};
+    int seen[VIEWS][4] = {{0}};
+    gbt_train_def def = run_def();
+    def.start_level = 0;
+    open_ok(&t, tiny, &def);
+    t.rules.step_pixels = 48 * 36 / 4;
+    for (; t.step < 4 * t.train_count; t.step++) {
+        const step_view *v = pick_ok(&t);
+        const size_t view = t.train_views[v->slot];
+        const double *all = t.scene.views[view].camera.params, *own = v->camera.params;
+        const int x = (int)lround(all[2] - own[2]), y = (int)lround(all[3] - own[3]);
+        assert_true(v->outcome.parts == 2 && v->outcome.level == 0 && v->frame.draw.pixel_step == 1);
+        assert_true(v->photo.width == 24 && v->photo.height == 18);
+        assert_true((x == 0 || x == 24) && (y == 0 || y == 18));
+        assert_ok(photos_get(&t.photos, view, 0, &whole, NULL));
+        assert_true(is_from(&v->photo, &whole, x, y, 1));
+        seen[v->slot][x / 24 + 2 * (y / 18)]++;
+    }
+    for (size_t i = 0; i < 4 * t.train_count; i++)
+        assert_int_equal(seen[i / 4][i % 4], 1);
+    image_free(&whole);
+    trainer_free(&t);
+}
+
+/* Of every second pixel in both directions, all four that may be the first come. */
+static void picked_pixels_begin_anywhere(void **state)
+{
+    (void)state;
+    trainer t;
+    image whole = {0};
+    int seen[4] = {0};
+    gbt_make_scene_def scene_def = gbt_make_scene_def_default();
+    scene_def.width = scene_def.height = 160; /* of smaller photos steps see all pixels */
+    scene_def.view_count = VIEWS;
+    scene_def.points = 150;
+    scene_def.samples = 1;
+    assert_ok(gbt_make_scene(&scene_def, in_root("square"), NULL));
+    gbt_train_def def = run_def();
+    def.iterations = 1000;
+    def.start_level = 1;
+    open_ok(&t, in_root("square"), &def);
+    for (; t.step < 10 * t.train_count; t.step++) {
+        const step_view *v = pick_ok(&t);
+        assert_true(v->outcome.level == 1 && v->outcome.parts == 1 && v->frame.draw.pixel_step == 2);
+        assert_true(v->photo.width == 80 && v->photo.height == 80);
+        assert_ok(photos_get(&t.photos, t.train_views[v->slot], 0, &whole, NULL));
+        int found = 0;
+        for (int i = 0; i < 4; i++)
+            if (is_from(&v->photo, &whole, i % 2, i / 2, 2)) {
+                found++;
+                seen[i]++;
+            }
+        assert_int_equal(found, 1);
+    }
+    for (int i = 0; i < 4; i++)
+        assert_true(seen[i] > 0);
+    image_free(&whole);
+    trainer_free(&t);
+}
+
 /* Photos for which there is no memory are read again, and are the same. */
 static void photos_keep_to_their_memory(void **state)
 {
@@ -1794,6 +1925,8 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_config_ends_with_its_buffer),
         cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(parts_make_up_the_photo),
+        cmocka_unit_test(every_part_has_its_turn),
+        cmocka_unit_test(picked_pixels_begin_anywhere),
         cmocka_unit_test(photos_keep_to_their_memory),
         cmocka_unit_test(steps_keep_to_their_pixels),
         cmocka_unit_test(wide_photos_get_a_usual_width),
@@ -1801,6 +1934,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(interrupted_and_resumed_is_straight),
         cmocka_unit_test(extra_checkpoints_change_nothing),
         cmocka_unit_test(resumes_from_a_save_beside_the_steps),
+        cmocka_unit_test(a_save_has_its_own_exposures_and_poses),
         cmocka_unit_test(killed_and_resumed_is_straight),
         cmocka_unit_test(resumes_from_the_previous_checkpoint),
         cmocka_unit_test(a_signal_saves_and_ends),

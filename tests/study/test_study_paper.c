@@ -585,6 +585,10 @@ static void what_a_scene_needs(void **state)
             psnr += metric_of(run, "psnr") / 2;
             final += metric_of(run, "anchors_final") / 2;
         }
+        snprintf(run + strlen(run), sizeof run - strlen(run), "/config");
+        char *config = read_text(run);
+        assert_non_null(strstr(config, "\nfind-exposure = 0\n"));
+        mem_free(config);
         assert_near(figure_of(json_array_get(runs, v), "psnr"), psnr, 1e-6);
         assert_near(figure_of(json_array_get(runs, v), "anchors_final"), final, 1e-6);
     }

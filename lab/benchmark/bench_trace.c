@@ -141,9 +141,8 @@ static void print_figures(const measured *m, FILE *out)
 
 static json_t *way_to_json(const measured *m, size_t way)
 {
-    figure_row rows[ROW_COUNT], first[ROW_COUNT];
+    figure_row rows[ROW_COUNT];
     list_figures(m, way, rows);
-    list_figures(m, 0, first);
     json_t *out = json_pack("{s:s,s:s}", "kernel", bench_kernel_name(m->kernel[way]), "isa",
                             cpu_isa_name(m->ways[way].isa));
     if (m->kernel[way] == TRACE_LIST)

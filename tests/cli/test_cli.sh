@@ -359,7 +359,7 @@ bench="bench trace --model gaussians.ply --camera camera.json --repeats 1"
 prints "bench" '^forward, core-us/ray  *[0-9.]*$' $bench --json one.json
 prints "bench of several kernels gives ratios" '^adjoint, core-us/ray  *[0-9.]*  *[0-9.]*  *[0-9.]*x' $bench --kernel tile,embree --check --json two.json
 for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candidates_per_packet tests_per_ray hits_per_ray blended_per_ray rows_per_packet \
-    row_pairs_per_packet tape_bytes tree_bytes record_bytes forward_seconds build_ms; do
+    row_pairs_per_packet tape_bytes tree_bytes list_bytes record_bytes forward_seconds build_ms; do
     [ "$(grep -c "\"$name\": [0-9]" one.json)" = 2 ] && [ "$(grep -c "\"$name\": [0-9]" two.json)" = 3 ] # at the top, and once per kernel
     report $? "bench writes $name" "$(cat two.json)"
 done

@@ -140,6 +140,7 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
     char path[4096];
     if (def->models == NULL || def->model_count < 1 || def->model_count > RATE_MODELS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d runs", (int)RATE_MODELS_MAX);
+    GBT_TRY(study_models_differ(def->models, def->model_count, err));
     GBT_TRY(file_make_folder(folder, err));
     GBT_TRY(file_join(path, sizeof path, folder, "rate.model.gbt", err));
     rate_study *study = mem_calloc(1, sizeof *study, "study", err);

@@ -367,6 +367,7 @@ gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *o
         def->repeats < 1 || def->repeats > 1000)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models and 1 to 1000 repeats",
                          (int)SPEED_MODELS_MAX);
+    GBT_TRY(study_models_differ(def->models, def->model_count, err));
     GBT_TRY(file_make_folder(folder, err));
     speed_study *study = mem_calloc(1, sizeof *study, "study", err);
     if (study == NULL)

@@ -411,6 +411,9 @@ misuse 2 "study crosscheck: wanted a model, or data to train on" study crosschec
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
 misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
 misuse 2 '--tables: "1,5" (wanted some of 1,2,3,4)' study paper made -o study --tables 1,5
+for study in speed crosscheck rate; do
+    misuse 2 "study: a/r/E and b/r/E/ would have one name (wanted paths whose last two parts differ)" study $study a/r/E a/q/E b/r/E/ -o study
+done
 misuse 2 "study: two data sets are called made; their runs would share a folder" study time made made -o study
 awk 'NF == 14 { $1 += 0.03 } 1' gaussians.ply >halves.ply # at places that no half-precision number holds
 "$program" study speed halves.ply -o study --repeats 1 >out 2>err

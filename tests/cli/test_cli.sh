@@ -456,6 +456,10 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
             "$program" eval run $other --json other.json >out 2>err && grep -q 'these scores are in other.json; ' err &&
             find run -type f -exec cksum {} + | sort | cmp -s - before
         report $? "eval $other changes nothing in the run" "$(cat err; find run -newer before)"
+        "$program" eval run $other --json ./run/metrics.json >out 2>err
+        [ $? = 2 ] && grep -q '^error: ./run/metrics.json: would be overwritten (--json must be another file)$' err &&
+            find run -type f -exec cksum {} + | sort | cmp -s - before
+        report $? "eval $other does not take the place of the run's scores" "$(cat err; find run -newer before)"
         if [ "$other" = '--preset fast' ]; then
             [ "$(grep -c '^  "preset": "fast"' other.json)" = 1 ]
             report $? "eval says with which preset it scored" "$(cat other.json)"

@@ -38,7 +38,6 @@ def train(data, run, seed, *settings):
     if not os.path.exists(os.path.join(run, "crossed.json")):
         other = "trace" if "raster" in settings else "raster"
         call("eval", run, "--renderer", other, "--json", os.path.join(run, "crossed.json"))
-        call("eval", run)
     figures = read(os.path.join(run, "metrics.json"))
     figures["crossed"] = read(os.path.join(run, "crossed.json"))["psnr"]
     return figures

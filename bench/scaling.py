@@ -64,4 +64,4 @@ with tempfile.TemporaryDirectory() as folder:
             forward = r["forward_core_us_per_ray"]
             first = first or forward
             print(f"| {size} x {size} | {count:,} | {r['hits_per_ray']:.1f} | {r['blended_per_ray']:.1f} | {forward:.3f} | {forward / first:.2f} "
-                  f"| {r['adjoint_core_us_per_ray']:.3f} | {r['build_ms']:.0f} | {(r['tree_bytes'] + r['record_bytes']) / count:.0f} |")
+                  f"| {r['adjoint_core_us_per_ray']:.3f} | {r['build_ms']:.0f} | {(r['tree_bytes'] + r['list_bytes'] + r['record_bytes']) / count:.0f} |")

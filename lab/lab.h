@@ -62,7 +62,8 @@ lab_bench_query_def lab_bench_query_def_default(void);
 gbt_status lab_bench_query(const lab_bench_query_def *def, const char *folder, FILE *out, gbt_error *err);
 
 typedef struct lab_study_def {
-    const char *const *models; /* plain Gaussians, or runs */
+    const char *const *models; /* plain Gaussians, or runs; their names are the last two parts of their
+                                  paths, and differ */
     size_t model_count;        /* 1 to 16 */
     const char *camera; /* camera file of all plain Gaussians; NULL: the camera.json beside each. Runs: their
                            first held-out view. Default NULL */

@@ -38,7 +38,8 @@ gbt_evaluate_def gbt_evaluate_def_default(void);
  * held-out views the scores are null ("n/a"), never NaN.
  *
  * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own
- * data set is gone) nothing in RUN changes: the scores go to stderr, and to the file `json` when it is given.
+ * data set is gone) nothing in RUN changes: the scores go to stderr, and to the file `json` when it is given
+ * (GBT_ERR_ARGUMENT when that is RUN/metrics.json).
  *
  * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED: scores and report are as before.
  *

@@ -106,6 +106,7 @@ static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
     if (sample < 0) { /* the first build: what Embree holds for it is new */
         w->figures.tree_bytes =
             w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
+        w->figures.list_bytes = w->traced.listed ? view_lists_bytes(&w->traced.lists) : 0;
         w->figures.record_bytes = p->g->count * RECORD_FLOATS * sizeof(float);
         return GBT_OK;
     }

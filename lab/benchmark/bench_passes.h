@@ -14,6 +14,7 @@ typedef struct bench_figures {
                                                 rays, medians */
     kernel_counters counters;                /* of one forward pass */
     size_t tree_bytes, record_bytes;
+    size_t list_bytes; /* view_lists_bytes() */
 } bench_figures;
 
 /** Splats in place of rays. */

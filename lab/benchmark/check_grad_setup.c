@@ -45,28 +45,38 @@ static gbt_status allocate(grad_checker *c, gbt_error *err)
     return fine ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* The first held-out view (the first one, when none is held out), small: the reference asks every Gaussian
-   about every ray. */
-gbt_status grad_set_up(grad_checker *c, gbt_error *err)
+/* Small: the reference asks every Gaussian about every ray. */
+static gbt_status take_view(grad_checker *c, size_t view, gbt_error *err)
 {
-    const scene *s = &c->run->scene;
-    size_t view = 0;
-    while (view < s->view_count && !s->views[view].is_test)
-        view++;
-    if (view == s->view_count)
-        view = 0;
     c->view = view;
     GBT_TRY(grad_render_at(c, view, CHECK_WIDTH, err));
     if (c->frame->gaussians.count > LARGE_COUNT)
         GBT_TRY(grad_render_at(c, view, CHECK_WIDTH_LARGE, err));
-    GBT_TRY(scene_read_photo_valid(&s->views[view], c->width, c->height, &c->photo, &c->valid, err));
+    image_free(&c->photo);
+    mem_free(c->valid);
+    GBT_TRY(
+        scene_read_photo_valid(&c->run->scene.views[view], c->width, c->height, &c->photo, &c->valid, err));
     for (size_t i = 0; i < c->ray_count; i++)
         c->valid_count += c->valid == NULL || c->valid[i];
+    return GBT_OK;
+}
+
+/* The first view that is not masked whole, of the held-out ones first. */
+gbt_status grad_set_up(grad_checker *c, gbt_error *err)
+{
+    const scene *s = &c->run->scene;
+    for (int pass = 0; pass < 2; pass++)
+        for (size_t i = 0; i < s->view_count && c->valid_count == 0; i++)
+            if (s->views[i].is_test == (pass == 0))
+                GBT_TRY(take_view(c, i, err));
+    if (c->valid_count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: every photo is masked whole (wanted one that is not)",
+                         s->folder);
     GBT_TRY(allocate(c, err));
     image_loss_result loss;
     GBT_TRY(loss_of_image(&c->frame->rgb, &c->photo, c->valid, &c->scratch, &c->d_image, &loss, err));
     fprintf(c->out, "%s, %d x %d pixels: %zu Gaussians of %zu visible anchors, loss %.6g\n",
-            s->views[view].name, c->width, c->height, c->scene.count, c->frame->visible_count,
+            s->views[c->view].name, c->width, c->height, c->scene.count, c->frame->visible_count,
             loss.loss + loss_of_gaussians(&c->frame->gaussians, grad_volume_weight(c)));
     fprintf(c->out, "%-12s%-12s%12s%12s\n", "stage", "class", "error", "limit");
     return GBT_OK;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* stability/order.c -- cases of the study "stability" about order: ties, and very many hits. */
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -60,6 +61,7 @@ static void stacks(stability *s)
     const raster_settings splat = raster_settings_default();
     const gbt_camera camera = draw_pinhole(SIZE, SIZE, 100, here);
     drawing ours = {0}, theirs = {0};
+    trace_scene timed = {.kernel = TRACE_TILE}; /* which builds a tree; lists are made with the first rays */
     ray_image rays = {0};
     gaussians g = {0};
     stack_errors e = {0}, r = {0};
@@ -72,8 +74,9 @@ static void stacks(stability *s)
         stack_up(s, n, alpha, depth, &g);
         const double start = clock_wall();
         if (s->status == GBT_OK)
-            stability_ok(s, trace_build(&ours.traced, &g, &settings, 0, s->err));
+            stability_ok(s, trace_build(&timed, &g, &settings, 0, s->err));
         e.build_seconds = clock_wall() - start;
+        assert(s->status != GBT_OK || timed.tree.box_count == n);
         draw_traced(s, &ours, &g, &settings, &rays);
         for (size_t p = 0; p < 16 && s->status == GBT_OK; p++)
             compare_stack(&ours, p, (double)(float)alpha, n, stop, &e);
@@ -91,6 +94,7 @@ static void stacks(stability *s)
     stability_check(s, "A4c", e.color, r.color,
                     "The first half is red and the second blue: equal depths go by index.");
     stability_check(s, "A4e", e.build_seconds, NAN, "%.0f copies.", most);
+    trace_scene_free(&timed);
     drawing_free(&ours);
     drawing_free(&theirs);
     ray_image_free(&rays);

@@ -192,16 +192,10 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
 
 /* ---- one view ---- */
 
-/* Letters, digits, '.' and '-' stay. */
 static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZE])
 {
-    char name[CROSS_NAME_SIZE];
-    snprintf(name, sizeof name, "crosscheck_%.120s_%.120s.png", of, view);
-    for (char *c = name; *c != '\0'; c++)
-        if (!((*c >= 'a' && *c <= 'z') || (*c >= 'A' && *c <= 'Z') || (*c >= '0' && *c <= '9') || *c == '.' ||
-              *c == '-'))
-            *c = '_';
-    memcpy(out, name, sizeof name);
+    snprintf(out, CROSS_NAME_SIZE, "crosscheck_%.120s_%.120s.png", of, view);
+    study_model_letters(out);
 }
 
 /* With `pictures` and `traced` of the size of the camera. */
@@ -329,6 +323,7 @@ gbt_status lab_study_crosscheck(const lab_study_def *def, const char *folder, FI
 {
     if (def->models == NULL || def->model_count < 1 || def->model_count > CROSS_MODELS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models", (int)CROSS_MODELS_MAX);
+    GBT_TRY(study_models_differ(def->models, def->model_count, err));
     GBT_TRY(file_make_folder(folder, err));
     cross_study *study = mem_calloc(1, sizeof *study, "study", err);
     if (study == NULL)

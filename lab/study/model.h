@@ -12,6 +12,12 @@
     one layout. Cut to `size`. */
 void study_model_name(const char *path, char *out, size_t size);
 
+/** Letters, digits, '.' and '-' stay; others become '_': a part of a file's name. */
+void study_model_letters(char *name);
+
+/** GBT_ERR_ARGUMENT where two of the models would have one name, or files of one name. */
+gbt_status study_models_differ(const char *const *paths, size_t count, gbt_error *err);
+
 /** The camera of a file of plain Gaussians: what the caller says (not NULL), else camera.json beside it.
     GBT_OK or GBT_ERR_ARGUMENT (there is none, or its path is longer than `size`). */
 gbt_status study_model_camera(const char *path, const char *given, char *out, size_t size, gbt_error *err);

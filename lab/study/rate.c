@@ -21,36 +21,38 @@ _Static_assert(sizeof ladder / sizeof *ladder <= RATE_ROWS_MAX, "every quality h
 
 /* ---- scores ---- */
 
-static gbt_status score_view(loaded_run *r, size_t view, image_scores *sum, gbt_error *err)
+static gbt_status score_view(loaded_run *r, size_t view, image_scores *scores, gbt_error *err)
 {
     GBT_TRY(loaded_run_render(r, view, err));
     image photo = {0};
     unsigned char *marks = NULL;
     const unsigned char *valid = NULL;
-    image_scores scores = {0};
     gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height,
                                                &photo, &marks, err);
     if (status == GBT_OK)
         status = frame_valid(&r->frame, marks, &valid, err);
     if (status == GBT_OK)
-        status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, &scores, err);
-    sum->psnr += scores.psnr;
-    sum->ssim += scores.ssim;
+        status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, scores, err);
     image_free(&photo);
     mem_free(marks);
     return status;
 }
 
-/* As gbtrace eval: means over the held-out views, NaN without them. */
+/* As gbtrace eval: means over the held-out views that are not masked whole, NaN without them. */
 static gbt_status score_model(loaded_run *r, size_t *views, double *psnr, double *ssim, gbt_error *err)
 {
-    image_scores sum = {0};
+    image_scores sum = {0}, scores = {0};
     *views = 0;
-    for (size_t view = 0; view < r->scene.view_count; view++)
-        if (r->scene.views[view].is_test) {
-            GBT_TRY(score_view(r, view, &sum, err));
-            ++*views;
-        }
+    for (size_t view = 0; view < r->scene.view_count; view++) {
+        if (!r->scene.views[view].is_test)
+            continue;
+        GBT_TRY(score_view(r, view, &scores, err));
+        if (!isfinite(scores.psnr))
+            continue;
+        sum.psnr += scores.psnr;
+        sum.ssim += scores.ssim;
+        ++*views;
+    }
     *psnr = sum.psnr / (double)*views;
     *ssim = sum.ssim / (double)*views;
     return GBT_OK;
@@ -140,6 +142,7 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
     char path[4096];
     if (def->models == NULL || def->model_count < 1 || def->model_count > RATE_MODELS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d runs", (int)RATE_MODELS_MAX);
+    GBT_TRY(study_models_differ(def->models, def->model_count, err));
     GBT_TRY(file_make_folder(folder, err));
     GBT_TRY(file_join(path, sizeof path, folder, "rate.model.gbt", err));
     rate_study *study = mem_calloc(1, sizeof *study, "study", err);

@@ -231,11 +231,12 @@ static float round_to_half(float x)
     return fminf(fmaxf(ldexpf(nearbyintf(ldexpf(x, -low)), low), -65504), 65504);
 }
 
-/* Records of half the size: every number rounded to a half, or all but the mean. */
+/* Records of half the size: every number rounded to a half, or all but the mean. Through the tree, which
+   reads these records alone: lists make others of the Gaussians. */
 static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean,
                                const bench_reference *want, bench_error *out, gbt_error *err)
 {
-    trace_scene traced = {0};
+    trace_scene traced = {.kernel = TRACE_TILE};
     image rgb = {0};
     gbt_status status = image_alloc(&rgb, s->rays.width, s->rays.height, 3, err);
     if (status == GBT_OK)
@@ -366,6 +367,7 @@ gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *o
         def->repeats < 1 || def->repeats > 1000)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d models and 1 to 1000 repeats",
                          (int)SPEED_MODELS_MAX);
+    GBT_TRY(study_models_differ(def->models, def->model_count, err));
     GBT_TRY(file_make_folder(folder, err));
     speed_study *study = mem_calloc(1, sizeof *study, "study", err);
     if (study == NULL)

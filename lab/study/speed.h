@@ -61,8 +61,8 @@ typedef struct speed_study {
     int repeats, threads;
 } speed_study;
 
-/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count.
-    Nothing for a .ply. */
+/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count,
+    without photos that are masked whole. Nothing for a .ply. */
 gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);
 
 /** How it is written down. */

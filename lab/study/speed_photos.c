@@ -10,17 +10,19 @@
 #include "image/metrics.h"
 #include "study/speed.h"
 
-/* What one row makes of the view that `s` holds. */
+/* What one row makes of the view that `s` holds, with its near distance. */
 static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *traced,
                        raster_scene *splatted, image *rgb, gbt_error *err)
 {
+    trace_settings settings = row->settings;
+    settings.t_near = s->settings.t_near;
     if (!row->splats) {
-        GBT_TRY(trace_build(traced, s->gaussians, &row->settings, ray_image_reach(&s->rays), err));
+        GBT_TRY(trace_build(traced, s->gaussians, &settings, ray_image_reach(&s->rays), err));
         return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
     }
-    const raster_settings settings = frame_splat_settings(&row->settings, row->form);
+    const raster_settings splat = frame_splat_settings(&settings, row->form);
     return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians,
-                          &s->camera.shot.camera, &settings, false, rgb, NULL, NULL, err);
+                          &s->camera.shot.camera, &splat, false, rgb, NULL, NULL, err);
 }
 
 /* Other kernels and instruction sets give the picture of the default. */
@@ -29,31 +31,45 @@ static bool is_own_picture(const speed_row *row)
     return !row->is_default && row->knob != KNOB_KERNEL && row->knob != KNOB_ISA;
 }
 
+/* As gbtrace eval scores it. A photo that is masked whole counts for no row. */
 static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
     s->camera.shot = ray_shot_of(&camera);
+    s->settings.t_near = loaded_run_settings(s->run, view).t_near;
     GBT_TRY(bench_scene_decode(s, err));
-    image photo = {0}, rgb = {0};
+    image photo = {0}, copy = {0}, rgb = {0};
     trace_scene traced = {0};
     raster_scene splatted = {0};
-    unsigned char *valid = NULL;
+    unsigned char *marks = NULL;
+    const unsigned char *valid = NULL;
+    bool counts = true;
     gbt_status status =
-        scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &valid, err);
+        scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &marks, err);
+    if (status == GBT_OK)
+        status = frame_valid(&s->run->frame, marks, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&rgb, camera.width, camera.height, 3, err);
-    image_quantize(&photo);
-    for (size_t i = 0; i < out->row_count && status == GBT_OK; i++) {
+    if (status == GBT_OK)
+        status = image_alloc(&copy, camera.width, camera.height, 3, err);
+    for (size_t i = 0; i < out->row_count && status == GBT_OK && counts; i++) {
+        image_scores scores = {0};
         if (!is_own_picture(&out->rows[i]))
             continue;
         status = draw(s, &out->rows[i], &traced, &splatted, &rgb, err);
-        image_quantize(&rgb);
-        out->rows[i].photo_psnr += metric_psnr_valid(&rgb, &photo, valid);
+        if (status != GBT_OK)
+            break;
+        memcpy(copy.pixels, photo.pixels, 3 * ray_image_count(&s->rays) * sizeof *copy.pixels);
+        status = image_score_photo(&rgb, &copy, valid, s->run->def.exposure, NULL, &scores, err);
+        counts = isfinite(scores.psnr);
+        out->rows[i].photo_psnr += counts ? scores.psnr : 0;
     }
+    out->photo_count += counts;
     trace_scene_free(&traced);
     raster_scene_free(&splatted);
     image_free(&photo);
-    mem_free(valid);
+    image_free(&copy);
+    mem_free(marks);
     image_free(&rgb);
     return status;
 }
@@ -64,12 +80,9 @@ gbt_status speed_measure_photos(bench_scene *s, speed_model *out, gbt_error *err
         return GBT_OK;
     for (size_t i = 0; i < out->row_count; i++)
         out->rows[i].photo_psnr = 0;
-    for (size_t view = 0; view < s->run->scene.view_count; view++) {
-        if (!s->run->scene.views[view].is_test)
-            continue;
-        GBT_TRY(score_view(s, view, out, err));
-        out->photo_count++;
-    }
+    for (size_t view = 0; view < s->run->scene.view_count; view++)
+        if (s->run->scene.views[view].is_test)
+            GBT_TRY(score_view(s, view, out, err));
     for (size_t i = 0; i < out->row_count; i++) /* the second row is the preset "default" */
         out->rows[i].photo_psnr = is_own_picture(&out->rows[i])
                                       ? out->rows[i].photo_psnr / (double)out->photo_count

@@ -68,6 +68,10 @@ static void add_variants(const time_study *s, size_t scene, text *out)
 static void add_words(const time_study *s, size_t scene, text *out)
 {
     const stat_sample reached = time_saved(s, scene), theirs = time_psnr(s, scene, TIME_FAITHFUL);
+    if (!isfinite(theirs.mean)) {
+        text_add(out, "\nThe faithful protocol's end: n/a.\n");
+        return;
+    }
     text_format(out, "\nThe faithful protocol ends at ");
     stat_add(out, &theirs, 2, false);
     text_format(out, " dB after %.3g s. ", mean_of(s, scene, TIME_FAITHFUL, seconds_of));

@@ -56,7 +56,8 @@ static void log_scores(const evaluation *e)
 static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
                            gbt_error *err)
 {
-    char own_model[4096];
+    char own_model[4096], own_scores[4096];
+    GBT_TRY(file_join(own_scores, sizeof own_scores, run, "metrics.json", err));
     GBT_TRY(file_join(own_model, sizeof own_model, run, "model.gbt", err));
     if (def->json != NULL && file_is_same(def->json, own_model))
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
@@ -74,6 +75,9 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
     *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
            (def->preset == GBT_PRESET_AS_TRAINED || def->preset == GBT_PRESET_DEFAULT) &&
            (def->data == NULL || data[0] == '\0' || file_is_same(def->data, data));
+    if (!*own && def->json != NULL && file_is_one(def->json, own_scores))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
+                         def->json);
     return GBT_OK;
 }
 

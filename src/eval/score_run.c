@@ -46,6 +46,8 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     score->masked = valid != NULL;
     if (status == GBT_OK && net != NULL)
         status = lpips_compare(net, render, &photo, valid, first_column, &score->lpips, err);
+    if (isnan(score->psnr)) /* without a pixel that counts both pictures are the photo, and LPIPS is 0 */
+        score->lpips = (lpips_scores){(double)NAN, (double)NAN};
     if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
     const image *const pictures[] = {render, &photo, &error_map};

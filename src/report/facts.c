@@ -60,14 +60,12 @@ static bool add_pace(text *out, const json_t *metrics)
 static void add_counts(text *out, const evaluation *e, const json_t *metrics)
 {
     const double bytes = e->model_bytes > 0 ? (double)e->model_bytes : (double)NAN;
-    const double seen = metrics_number(metrics, "gaussians_per_view");
     text_add(out, "<div class=\"box card\"><h3>From points to a model</h3><table class=\"facts\"><tbody>\n");
     report_text_row(out, "Started from", metrics_text(metrics, "start"));
     report_count_row(out, "Points", metrics_number(metrics, "points"));
     report_count_row(out, "Anchors at the start", metrics_number(metrics, "anchors_initial"));
     report_count_row(out, "Anchors at the end", (double)e->anchors);
-    report_count_row(out, "Gaussians per view",
-                     isfinite(e->gaussians_per_view) ? e->gaussians_per_view : seen);
+    report_count_row(out, "Gaussians per view", e->gaussians_per_view);
     report_bytes_row(out, "Model file", bytes);
     report_number_row(out, "Bytes per anchor", e->anchors > 0 ? bytes / (double)e->anchors : (double)NAN, 1,
                       "");

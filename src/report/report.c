@@ -49,10 +49,7 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
 {
     text_add(out, "<dl class=\"tiles\">\n");
     open_tile(out, "Held-out PSNR");
-    if (isinf(e->psnr) && e->psnr > 0)
-        text_add(out, "\xe2\x88\x9e");
-    else
-        text_number(out, e->psnr, 2);
+    text_number(out, e->psnr, 2);
     close_tile(out, isnan(e->psnr) ? "" : "dB");
     if (isfinite(e->psnr_fitted)) {
         open_tile(out, "PSNR, colours fitted");
@@ -77,8 +74,7 @@ static void add_tiles(text *out, const evaluation *e, const json_t *metrics)
     text_count(out, (double)e->anchors);
     close_tile(out, "");
     open_tile(out, "Gaussians per view");
-    text_count(out, isfinite(e->gaussians_per_view) ? e->gaussians_per_view
-                                                    : metrics_number(metrics, "gaussians_per_view"));
+    text_count(out, e->gaussians_per_view);
     close_tile(out, "");
     open_tile(out, "Model file");
     text_bytes(out, e->model_bytes > 0 ? (double)e->model_bytes : (double)NAN);
@@ -152,7 +148,7 @@ gbt_status report_write(const char *run, const evaluation *e, const json_t *metr
         report_layers(&layers, open, e);
     }
     add_head(&out, run, e, metrics, open != NULL, layers.length > 0, studies.length > 0);
-    report_views(&out, run, e, metrics_text(metrics, "protocol"));
+    report_views(&out, run, e, metrics_text(metrics, "protocol"), metrics_text(metrics, "scored"));
     text_append(&out, &place);
     text_append(&out, &layers);
     report_training(&out, run, e, metrics);

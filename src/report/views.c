@@ -56,15 +56,6 @@ size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
     return REPORT_MAX_VIEWS;
 }
 
-/** PSNR of equal images is infinite. */
-static void add_psnr(text *out, double psnr)
-{
-    if (isinf(psnr) && psnr > 0)
-        text_add(out, "\xe2\x88\x9e");
-    else
-        text_number(out, psnr, 2);
-}
-
 /** An <img>, or a line that says that there is none. */
 static void add_picture(text *out, const char *class_name, const char *what, const view_score *v,
                         const char *path, picture_kind kind, size_t most)
@@ -88,10 +79,7 @@ static void add_picture(text *out, const char *class_name, const char *what, con
 static void add_score(text *out, const char *name, double value, int decimals, const char *unit)
 {
     text_format(out, "<span class=\"score\">%s <b>", name);
-    if (decimals == 2)
-        add_psnr(out, value);
-    else
-        text_number(out, value, decimals);
+    text_number(out, value, decimals);
     text_format(out, "</b>%s</span>", unit);
 }
 
@@ -158,10 +146,8 @@ static void add_link(text *out, const char *run, const char *path, const char *n
 
 static void add_cell(text *out, double value, int decimals)
 {
-    text_format(out, "<td data-value=\"%.9g\">", isfinite(value) ? value : value > 0 ? 1e9 : -1e9);
-    if (decimals == 2)
-        add_psnr(out, value);
-    else if (decimals == 0)
+    text_format(out, "<td data-value=\"%.9g\">", isfinite(value) ? value : -1e9);
+    if (decimals == 0)
         text_count(out, value);
     else
         text_number(out, value, decimals);
@@ -238,7 +224,7 @@ static bool are_tall(const evaluation *e, const size_t *shown, size_t count)
     return 2 * tall > count;
 }
 
-void report_views(text *out, const char *run, const evaluation *e, const char *protocol)
+void report_views(text *out, const char *run, const evaluation *e, const char *protocol, const char *scored)
 {
     text_add(out, "<section id=\"views\"><h2>Held-out views</h2>\n");
     size_t shown[REPORT_MAX_VIEWS], *order = NULL;
@@ -275,6 +261,10 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
     if (protocol != NULL) {
         text_add(out, "<p class=\"note\">How it is scored: ");
         text_escaped(out, protocol);
+        if (scored != NULL) {
+            text_add(out, "; ");
+            text_escaped(out, scored);
+        }
         text_add(out, ".</p>\n");
     }
     add_table(out, run, e, order, shown, count);

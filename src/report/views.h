@@ -11,9 +11,9 @@ enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
 
 /**
  * Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are
- * made, one sentence; NULL: nothing is said.
+ * made, one sentence; NULL: nothing is said. `scored`: of which pixels; optional (NULL).
  */
-void report_views(text *out, const char *run, const evaluation *e, const char *protocol);
+void report_views(text *out, const char *run, const evaluation *e, const char *protocol, const char *scored);
 
 /**
  * Which views to show, worst first (without a score: last).

@@ -279,6 +279,14 @@ gbt_status view_lists_reserve_slots(view_lists *lists, gbt_error *err)
                        sizeof *view->slot_used, "gradient records", err);
 }
 
+size_t view_lists_bytes(const view_lists *lists)
+{
+    const list_view *v = &lists->view;
+    return lists->record_capacity *
+               (sizeof *v->records + sizeof *v->shapes + sizeof *v->slot_first + sizeof *v->slot_count) +
+           lists->pair_capacity * sizeof *v->pairs;
+}
+
 void view_lists_free(view_lists *lists)
 {
     list_view *v = &lists->view;

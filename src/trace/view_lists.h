@@ -32,6 +32,10 @@ gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const k
 /** Memory for what the adjoint leaves. GBT_OK or GBT_ERR_NO_MEMORY. */
 gbt_status view_lists_reserve_slots(view_lists *lists, gbt_error *err);
 
+/** Bytes that the records and pairs of the lists take, with their room to spare; not what is per tile, and
+   not what the adjoint leaves. */
+size_t view_lists_bytes(const view_lists *lists);
+
 void view_lists_free(view_lists *lists); /* back to {0} */
 
 #endif

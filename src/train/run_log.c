@@ -257,6 +257,8 @@ void run_log_step(run_log *log, const trainer *t, const step_report *report)
 
 void run_log_evaluation(run_log *log, const trainer *t, double psnr)
 {
+    if (isnan(psnr))
+        return;
     if (log->evaluated_count < GBT_TRAIN_MAX_EVALS) {
         log->evaluated_seconds[log->evaluated_count] = t->seconds;
         log->evaluated_step[log->evaluated_count] = t->step;

@@ -56,7 +56,7 @@ typedef struct run_log {
 gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, const char *events_path,
                         gbt_error *err);
 void run_log_step(run_log *log, const trainer *t, const step_report *report);
-void run_log_evaluation(run_log *log, const trainer *t, double psnr);
+void run_log_evaluation(run_log *log, const trainer *t, double psnr); /* NaN, no held-out photo: nothing */
 
 /** train.json: counts, seconds by stage, pace, machine. */
 gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path, gbt_error *err);

@@ -29,6 +29,8 @@ report $? "a scene" "$(cat out)"
 # ---- training
 holds "times of scores on the way" 0 '^3 held-out views: ' train made -o run --iterations 40 --eval-split every=3 --eval-at 1h,2h
 holds "a time before the first step" 0 '^warning: eval_at: .*times left out: 1$' train made -o early --iterations 3 --eval-at 0.0001s,1h
+"$program" train made -o blind --budget 0.6s --eval-split none --eval-at 0.3s >out 2>err && ! grep -q -w nan err
+report $? "no score on the way without held-out photos" "$(cat err)"
 holds "times that fall" 2 '^error: --eval-at: "1s" (wanted up to [0-9]* rising times' train made -o none --eval-at 2s,1s
 holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --eval-at soon
 holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"

@@ -29,7 +29,7 @@ static void lists_of_kernels(void **state)
 static void ways_in_turn(void **state)
 {
     (void)state;
-    enum { WAYS = 4 };
+    enum { WAYS = 5 };
     gaussians g = random_gaussians(300, 0.1f, 8);
     ray_image rays = pinhole_rays(48, 32);
     const trace_settings s = trace_settings_default();
@@ -39,7 +39,8 @@ static void ways_in_turn(void **state)
     bench_way ways[WAYS] = {{.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s},
                             {.kernel = TRACE_EMBREE, .isa = CPU_AVX512, .settings = s},
                             {.kernel = TRACE_TILE, .isa = CPU_PLAIN, .settings = s},
-                            {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .splat = &splat}};
+                            {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .splat = &splat},
+                            {.kernel = TRACE_LIST, .isa = CPU_AVX512, .settings = s}};
     assert_ok(bench_measure(ways, WAYS, &g, &rays, 2, NULL));
     assert_int_equal(cpu_best_isa(), before);
     bench_reference want = {0};
@@ -50,12 +51,13 @@ static void ways_in_turn(void **state)
         assert_true((f->build_ms > 0 || ways[i].splat != NULL) && f->build_us >= 0 && f->forward_us > 0 &&
                     f->adjoint_us > 0 && f->forward_seconds > 0 && f->adjoint_seconds > 0);
         assert_int_equal(f->counters.rays, 48 * 32);
-        assert_true(f->counters.blended > 0 &&
-                    (ways[i].splat != NULL || (f->tree_bytes > 0 && f->record_bytes == 300 * 64)));
+        assert_true(f->counters.blended > 0 && (ways[i].splat != NULL || (f->tree_bytes + f->list_bytes > 0 &&
+                                                                          f->record_bytes == 300 * 64)));
         assert_true(bench_reference_compare(&want, &ways[i].rgb).psnr > 90);
     }
     assert_memory_equal(ways[0].rgb.pixels, ways[2].rgb.pixels, 3 * 48 * 32 * sizeof(float));
     assert_true(ways[0].figures.counters.tape_bytes > 1000);
+    assert_true(ways[4].figures.tree_bytes == 0 && ways[4].figures.list_bytes > 300 * 104);
     ways[0].rgb.pixels[3 * (8 * 48 + 16) + 1] += 0.5f; /* pixel (16, 8) is one of those that count */
     const bench_error off = bench_reference_compare(&want, &ways[0].rgb);
     assert_near(off.max, 0.5, 1e-4);

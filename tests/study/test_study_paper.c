@@ -9,6 +9,7 @@
 #include "study/paper.h"
 #include "study/anchors.h"
 #include "study/time.h"
+#include "gbtrace/evaluate.h"
 #include "gbtrace/export.h"
 
 /* ---- numbers ---- */
@@ -614,6 +615,10 @@ static void what_a_scene_needs(void **state)
             psnr += metric_of(run, "psnr") / 2;
             final += metric_of(run, "anchors_final") / 2;
         }
+        snprintf(run + strlen(run), sizeof run - strlen(run), "/config");
+        char *config = read_text(run);
+        assert_non_null(strstr(config, "\nfind-exposure = 0\n"));
+        mem_free(config);
         assert_near(figure_of(json_array_get(runs, v), "psnr"), psnr, 1e-6);
         assert_near(figure_of(json_array_get(runs, v), "anchors_final"), final, 1e-6);
     }
@@ -633,6 +638,99 @@ static void what_a_scene_needs(void **state)
     mem_free(page);
 }
 
+/* ---- photos that are masked whole, scores of half of each photo ---- */
+
+/* The tiny scene with two held-out photos, of which the first is masked whole; `second`: the name of the
+ * other. */
+static void make_half_black_scene(const char *folder, char second[64])
+{
+    make_tiny_scene(folder);
+    assert_ok(file_make_folder(in_root("black/masks"), NULL));
+    scene s;
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    assert_true(s.views[0].is_test && s.views[8].is_test);
+    image black;
+    assert_ok(image_alloc(&black, 48, 36, 1, NULL));
+    memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
+    assert_ok(image_write(in_root("black/masks/%s.png", s.views[0].name), &black, NULL));
+    snprintf(second, 64, "%s,", s.views[8].name);
+    image_free(&black);
+    scene_free(&s);
+}
+
+/* FOLDER/NAME.json of a study of one run. */
+static json_t *study_of(const char *run, const char *name,
+                        gbt_status (*study)(const lab_study_def *, const char *, FILE *, gbt_error *))
+{
+    const char *models[] = {run}, *folder = in_root("of-%s", strrchr(run, '/') + 1);
+    lab_study_def def = lab_study_def_default();
+    def.models = models;
+    def.model_count = 1;
+    def.repeats = 1;
+    gbt_error err = {0};
+    json_t *whole;
+    FILE *out = tmpfile();
+    if (study(&def, folder, out, &err) != GBT_OK)
+        fail_msg("%s: %s", run, err.text);
+    fclose(out);
+    assert_ok(json_read(in_root("of-%s/%s.json", strrchr(run, '/') + 1, name), &whole, NULL));
+    json_t *model = json_incref(json_array_get(json_object_get(whole, "models"), 0));
+    json_decref(whole);
+    return model;
+}
+
+/* What the study "speed" has for the preset "default" is what eval has. */
+static void check_photo_psnr(const char *run)
+{
+    json_t *model = study_of(run, "speed", lab_study_speed);
+    const json_t *row = json_array_get(json_object_get(model, "settings"), 1);
+    assert_string_equal(json_string_value(json_object_get(row, "value")), "default");
+    assert_near(json_number_value(json_object_get(row, "photo_psnr")), metric_of(run, "psnr"), 0.01);
+    json_decref(model);
+}
+
+static void a_photo_masked_whole(void **state)
+{
+    (void)state;
+    const char *folder = in_root("black"), *run = in_root("black-run"), *halves = in_root("halves-run");
+    char second[64], line[256] = "";
+    gbt_error err = {0};
+    gbt_train_def def = run_def();
+    make_half_black_scene(folder, second);
+    train_ok(folder, run, &def);
+    def.exposure = true;
+    train_ok(folder, halves, &def);
+    check_photo_psnr(run);
+    check_photo_psnr(halves);
+
+    network alex = make_alex();
+    gbt_evaluate_def scores = gbt_evaluate_def_default();
+    scores.lpips = in_root("alex.safetensors");
+    write_network(&alex, scores.lpips, NULL);
+    free_network(&alex);
+    assert_ok(gbt_evaluate(run, &scores, NULL));
+    json_t *metrics;
+    assert_ok(json_read(in_root("black-run/metrics.json"), &metrics, NULL));
+    const json_t *views = json_object_get(metrics, "views"), *other = json_array_get(views, 1);
+    assert_true(json_is_null(json_object_get(json_array_get(views, 0), "lpips")));
+    assert_near(json_number_value(json_object_get(other, "lpips")), metric_of(run, "lpips"), 1e-12);
+    json_decref(metrics);
+
+    json_t *model = study_of(run, "rate", lab_study_rate);
+    assert_int_equal(json_integer_value(json_object_get(model, "views")), 1);
+    assert_near(json_number_value(json_object_get(model, "psnr")), metric_of(run, "psnr"), 1e-6);
+    json_decref(model);
+
+    FILE *out = tmpfile();
+    if (lab_check_grad(run, out, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    rewind(out);
+    assert_non_null(fgets(line, sizeof line, out));
+    if (strncmp(line, second, strlen(second)) != 0)
+        fail_msg("%s", line);
+    fclose(out);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -644,6 +742,7 @@ int main(void)
         cmocka_unit_test(lpips_of_finished_runs), cmocka_unit_test(runs_are_made_once),
         cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
         cmocka_unit_test(data_named_in_latin_1),
+        cmocka_unit_test(a_photo_masked_whole),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

@@ -539,6 +539,34 @@ static void no_surface_hides_itself(void **state)
     }
 }
 
+/* Pixels without a ray have the background's colour, which a sky cuts to [0, 1], by whatever draws them. */
+static void no_rays(void **state)
+{
+    (void)state;
+    const double wanted[3] = {1, 0, (double)background[2]};
+    double rgb[3 * W * H], left[W * H];
+    insert_scene in = {.ambient = 1};
+    studio st = open_studio(1, 3, 7);
+    image plain = {0};
+    add_plane(&in, &mirror, 5, 99);
+    shoot(&st, &in);
+    assert_ok(image_alloc(&plain, W, H, 3, NULL));
+    memset(st.rays.dir, 0, 3 * W * H * sizeof *st.rays.dir);
+    trace_settings *s = &st.scene.settings;
+    s->background[0] = 1.2f;
+    s->background[1] = -0.1f;
+    s->sky.varies = true;
+    s->sky.harmonic[0][2] = 0.5f;
+    assert_ok(insert_trace(&in, &st.scene, &st.rays, &st.rgb, NULL));
+    assert_ok(trace_forward(&st.scene, &st.rays, false, &(trace_outputs){.rgb = &plain}, NULL, NULL));
+    assert_ok(reference_forward(&st.g, s, &st.rays, rgb, left, NULL, NULL));
+    for (size_t i = 0; i < 3 * W * H; i++)
+        assert_true((double)st.rgb.pixels[i] == wanted[i % 3] && (double)plain.pixels[i] == wanted[i % 3] &&
+                    rgb[i] == wanted[i % 3]);
+    image_free(&plain);
+    close_studio(&st, &in);
+}
+
 static void threads_agree(void **state)
 {
     (void)state;
@@ -624,6 +652,7 @@ int main(void)
         cmocka_unit_test(shadow_on_a_mesh),
         cmocka_unit_test(light_of_a_disc),
         cmocka_unit_test(no_surface_hides_itself),
+        cmocka_unit_test(no_rays),
         cmocka_unit_test(threads_agree),
         cmocka_unit_test(a_corner_that_is_no_vertex),
         cmocka_unit_test(without_memory),

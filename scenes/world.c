@@ -41,17 +41,18 @@ bool world_trace(const world *w, const float origin[3], const float dir[3], surf
     mesh_hit hit;
     if (!mesh_tree_trace(w->tree, origin, dir, 0, INFINITY, &hit))
         return false;
-    const uint32_t *v = w->triangle + 3 * (size_t)hit.triangle;
-    const float weight[3] = {1 - hit.u - hit.v, hit.u, hit.v};
+    const uint32_t *vertex = w->triangle + 3 * (size_t)hit.triangle;
+    const double u = fmin(fmax(hit.u, 0), 1), v = fmin(fmax(hit.v, 0), 1 - u);
+    const float second = (float)u, third = (float)v, weight[3] = {1 - second - third, second, third};
     memset(out, 0, sizeof *out);
     for (int corner = 0; corner < 3; corner++) {
         for (int k = 0; k < 3; k++) {
-            out->normal[k] += weight[corner] * w->normal[3 * (size_t)v[corner] + (size_t)k];
+            out->normal[k] += weight[corner] * w->normal[3 * (size_t)vertex[corner] + (size_t)k];
             if (w->indirect != NULL)
-                out->indirect[k] += weight[corner] * w->indirect[3 * (size_t)v[corner] + (size_t)k];
+                out->indirect[k] += weight[corner] * w->indirect[3 * (size_t)vertex[corner] + (size_t)k];
         }
         for (int k = 0; k < 2; k++)
-            out->uv[k] += weight[corner] * w->uv[2 * (size_t)v[corner] + (size_t)k];
+            out->uv[k] += weight[corner] * w->uv[2 * (size_t)vertex[corner] + (size_t)k];
     }
     normalize(out->normal);
     memcpy(out->geometric, hit.normal, sizeof out->geometric);

@@ -121,7 +121,8 @@ typedef struct gbt_render_def {
                             path file. Default NULL */
     int frames; /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many
                    as a file has. Default 0 */
-    double fps; /* frames per second, [0, 1000]; 0: what a path file says, else 30. Default 0 */
+    double fps; /* frames per second, [0, 1000], in a .gif at most 50; 0: what a path file says, else
+                   30. Default 0 */
     int width, height;   /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the
                             photos. Default 0: as they, to even numbers */
     const char *look_at; /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as
@@ -145,7 +146,8 @@ gbt_render_def gbt_render_def_default(void);
  *
  * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file
  * or a path file `split` is not used, and the others are refused. A film has its name when it is whole, not
- * before.
+ * before. SIGCHLD must not be ignored while it is made: how ffmpeg ends is not known then, and the film
+ * fails.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

@@ -36,7 +36,8 @@ gbt_pose_def gbt_pose_def_default(void);
  *         GBT_ERR_IO (no colmap or ffmpeg, or one that failed: its log is named); GBT_ERR_FORMAT (no photos,
  *         or none could be registered); GBT_ERR_INTERRUPTED; GBT_ERR_NO_MEMORY
  *
- * Threads: one call at a time in a process; COLMAP uses as many threads as gbt_set_threads() says.
+ * Threads: one call at a time in a process; COLMAP uses as many threads as gbt_set_threads() says. SIGCHLD
+ * must not be ignored: how a program ends is not known then, and counts as a failure.
  */
 gbt_status gbt_pose(const char *source, const gbt_pose_def *def, const char *data, FILE *report,
                     gbt_error *err);

@@ -77,10 +77,8 @@ static bool take(const struct RTCFilterFunctionNArguments *args)
     if (!(t > s->t_min && t <= s->t_max &&
           (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
         return false;
-    /* Embree's test has no gaps along edges, so the hit may be outside by a rounding. */
-    u = fmin(fmax(u, 0), 1);
-    v = fmin(fmax(v, 0), 1 - u);
-    s->best = (mesh_hit){.t = t, .u = (float)u, .v = (float)v, .triangle = triangle};
+    /* Not cut to the triangle: at an edge that would move the point by what Embree's float is off. */
+    s->best = (mesh_hit){.t = t, .u = u, .v = v, .triangle = triangle};
     return true;
 }
 

@@ -32,8 +32,9 @@ gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uin
                            size_t triangle_count, mesh_tree **out, gbt_error *err);
 
 typedef struct mesh_hit {
-    float t;         /* in lengths of dir: the point is origin + t dir */
-    float u, v;      /* the point is (1 - u - v) a + u b + v c for the triangle (a, b, c) */
+    double u, v; /* the point is (1 - u - v) a + u b + v c for the triangle (a, b, c); at an edge it may be
+                    outside by Embree's rounding */
+    float t;     /* in lengths of dir: the point is origin + t dir */
     float normal[3]; /* geometric, unit: along (b - a) x (c - a), whichever side the ray came from */
     uint32_t triangle;
 } mesh_hit;
@@ -42,9 +43,9 @@ typedef struct mesh_hit {
  * The nearest hit with t_min < t <= t_max, from either side; among hits of equal float32 t the lowest
  * triangle number.
  *
- * t, u, v and the normal are computed in double and rounded, so they have the same bits for every instruction
- * set; only where two different triangles are hit within float32 rounding of each other (a shared edge) may
- * the set decide which of them is reported.
+ * t, u, v and the normal are computed in double (t and the normal are rounded), so they have the same bits
+ * for every instruction set; only where two different triangles are hit within float32 rounding of each other
+ * (a shared edge) may the set decide which of them is reported.
  *
  * @param dir [in] any length but 0; need not be unit
  * @param hit [out] untouched when there is none

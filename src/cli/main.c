@@ -108,6 +108,7 @@ int main(int argc, char **argv)
     gbt_when_out_of_memory(end_without_memory);
     signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is a failed write: one line, and nothing left behind
                                */
+    signal(SIGCHLD, SIG_DFL); /* where it is ignored, nobody knows how ffmpeg and COLMAP have ended */
     signal(SIGPIPE, SIG_IGN); /* a training goes on when nobody reads its progress any longer */
     gbt_error alone = {0};
     const gbt_status joined = gbt_cluster_open(&alone);

@@ -247,8 +247,8 @@ static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_l
     for (size_t i = 0; i < count; i++) {
         const size_t n = c->count;
         point_of(&keys[i], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
-        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1], DIMENSIONS) : 1;
-        if (!(way > 1e-9 * turn_length))
+        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1], DIMENSIONS) : 0;
+        if (n > 0 && !(way > 1e-9 * turn_length))
             continue;
         if (n > 0)
             c->gap[n - 1] = sqrt(way);

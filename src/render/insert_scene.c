@@ -67,7 +67,7 @@ gbt_status insert_finish(insert_scene *in, gbt_error *err)
     float largest = 0;
     for (size_t i = 0; i < 3 * in->vertex_count; i++)
         largest = fmaxf(largest, fabsf(in->vertices[i]));
-    in->offset_min = largest * 0x1p-10f * INSERT_OFFSET_SHARE;
+    in->offset_min = largest * 0x1p-40f; /* near 0; where a mesh is met is exact to about 2^-50 of its size */
     in->reach = largest * (1 + 2 * INSERT_OFFSET_SHARE);
     return mesh_tree_build(in->vertices, in->vertex_count, in->triangles, in->triangle_count, &in->tree, err);
 }

@@ -22,7 +22,7 @@ static uint32_t object_of(const insert_scene *in, uint32_t triangle)
 void insert_surface_at(const insert_scene *in, const mesh_hit *hit, const float dir[3], insert_surface *out)
 {
     const uint32_t *corner = in->triangles + 3 * (size_t)hit->triangle;
-    const double weight[3] = {1 - (double)hit->u - (double)hit->v, (double)hit->u, (double)hit->v};
+    const double weight[3] = {1 - hit->u - hit->v, hit->u, hit->v};
     double point[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, flat[3];
     out->object = object_of(in, hit->triangle);
     for (int c = 0; c < 3; c++)

@@ -213,6 +213,15 @@ static gbt_status render_frames(studio *st, const camera_path *path, const char 
     return GBT_OK;
 }
 
+static void warn_of_older_frames(size_t count, const char *out, const gbt_render_def *def)
+{
+    char path[4096];
+    const int length = snprintf(path, sizeof path, "%s/frame_%05zu.%s", out, count + 1,
+                                CHOICE_NAME(GBT_PICTURE_FORMAT_NAMES, def->format));
+    if (length < (int)sizeof path && file_exists(path))
+        log_warn("%s: frames from %zu on are of an earlier film", out, count + 1);
+}
+
 /* The frame that process `from` has drawn last goes to the first one. */
 static void collect_frame(const image *own, size_t from, image *out)
 {
@@ -274,6 +283,8 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
     if (status == GBT_OK)
         status = video_named(out) ? make_film(st, &path, out, def, err)
                                   : cluster_agree(render_frames(st, &path, out, def, err), err);
+    if (status == GBT_OK && !video_named(out) && cluster_leads())
+        warn_of_older_frames(path.count, out, def);
     if (status == GBT_OK)
         log_info("%zu frames rendered into %s, %.2f s at %g frames per second", path.count, out,
                  (double)path.count / path.fps, path.fps);

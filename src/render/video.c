@@ -19,15 +19,21 @@
 
 enum { PATH_LIMIT = 4096, ARGUMENTS_MAX = 48 };
 
+/* By itself ffmpeg converts by BT.601 and does not say so in the file; players take that for BT.709. */
+#define AS_BT709                                                                                             \
+    "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709", \
+        "-color_trc", "bt709", "-color_range", "tv"
+
 /* What ffmpeg is told for each kind of file. -f: the temporary name does not say it. */
 static const struct {
-    const char *ending, *options[16];
+    const char *ending, *options[24];
 } kinds[] = {
     {".mp4",
-     {"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart",
-      "-f", "mp4"}},
+     {"-c:v", "libx264", "-preset", "medium", "-crf", "18", "-pix_fmt", "yuv420p", AS_BT709, "-movflags",
+      "+faststart", "-f", "mp4"}},
     {".webm",
-     {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", "-f", "webm"}},
+     {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", AS_BT709, "-f",
+      "webm"}},
     {".gif", /* colours for each picture: ffmpeg would keep a whole film to find colours for all */
      {"-filter_complex", "[0:v]split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1",
       "-loop", "0", "-f", "gif"}},
@@ -113,7 +119,11 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
     if (kind == KINDS)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)",
                          path);
-    if (strcmp(kinds[kind].ending, ".gif") != 0 && (width % 2 != 0 || height % 2 != 0))
+    const bool gif = strcmp(kinds[kind].ending, ".gif") == 0;
+    if (gif && fps > 50) /* players take its shortest delay, 1/100 s, for a long one */
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %g frames per second (wanted at most 50 in a .gif)",
+                         path, fps);
+    if (!gif && (width % 2 != 0 || height % 2 != 0))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)",
                          path, width, height);
@@ -174,8 +184,10 @@ static int finish(video *v)
     if (v->process == 0)
         return 0;
     while (waitpid(v->process, &state, 0) < 0)
-        if (errno != EINTR)
+        if (errno != EINTR) { /* SIGCHLD is ignored: nobody knows how it ended */
+            state = 255 << 8;
             break;
+        }
     v->process = 0;
     return WIFEXITED(state) ? WEXITSTATUS(state) : 128 + (WIFSIGNALED(state) ? WTERMSIG(state) : 0);
 }

@@ -19,9 +19,10 @@ typedef struct video video;
  * Start ffmpeg, which takes raw pictures from a socket and writes beside `path` under another name.
  *
  * @param width, height [in] > 0; both even, but for .gif
- * @param fps           [in] > 0
+ * @param fps           [in] > 0; at most 50 for .gif, whose delays are whole 1/100 s
  * @param out           [out] end with video_close(); NULL on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (an odd size), GBT_ERR_IO (no ffmpeg), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (an odd size, too many frames a second), GBT_ERR_IO (no ffmpeg),
+ *         GBT_ERR_NO_MEMORY
  */
 gbt_status video_open(const char *path, int width, int height, double fps, video **out, gbt_error *err);
 

@@ -52,8 +52,8 @@ typedef struct packet_output {
     _Alignas(64) float transmittance[PACKET_LANES];
     unsigned ended; /* bit per lane, of parts of rays: it ended before a hit, by transmittance_min */
     /* with kernel_scene.extra; see trace_outputs */
-    _Alignas(64) float weighted_depth[PACKET_LANES],
-        median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
+    _Alignas(64) float weighted_depth[PACKET_LANES], weight[PACKET_LANES]; /* sums of T alpha t and T alpha */
+    _Alignas(64) float median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
     _Alignas(64) uint32_t strongest[PACKET_LANES];
 } packet_output;
 

@@ -6,14 +6,15 @@
 #include "trace/gaussian16.h"
 
 typedef struct packet_extra {
-    vfloat16 depth, median, normal[3], count, top_weight;
+    vfloat16 depth, weight; /* sums of T alpha t and T alpha; 1 - T has lost its digits where little is hit */
+    vfloat16 median, normal[3], count, top_weight;
     _Alignas(64) uint32_t top_id[PACKET_LANES];
 } packet_extra;
 
 static inline void start_extra(packet_extra *e)
 {
     const vfloat16 zero = vfloat16_set1(0);
-    *e = (packet_extra){zero, vfloat16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
+    *e = (packet_extra){zero, zero, vfloat16_set1(INFINITY), {zero, zero, zero}, zero, zero, {0}};
     memset(e->top_id, 0xFF, sizeof e->top_id);
 }
 
@@ -31,6 +32,7 @@ static inline void note_row(packet_extra *e, const packet_rays *rays, const floa
     for (int k = 0; k < 3; k++)
         e->normal[k] = vfloat16_fma(toward, vfloat16_set1(normal[k]), e->normal[k]);
     e->depth = vfloat16_fma(weight, vfloat16_select(blend, t, zero), e->depth);
+    e->weight = vfloat16_add(e->weight, weight);
     e->median =
         vfloat16_min(e->median, vfloat16_select(vmask16_and(blend, vfloat16_lt(next, vfloat16_set1(0.5f))), t,
                                                 vfloat16_set1(INFINITY)));
@@ -44,6 +46,7 @@ static inline void note_row(packet_extra *e, const packet_rays *rays, const floa
 static inline void store_extra(const packet_extra *e, packet_output *out)
 {
     vfloat16_store(out->weighted_depth, e->depth);
+    vfloat16_store(out->weight, e->weight);
     vfloat16_store(out->median_depth, e->median);
     vfloat16_store(out->hit_count, e->count);
     for (int k = 0; k < 3; k++)

@@ -14,7 +14,7 @@ enum { RAY_ROUND = 80 };
 
 typedef struct ray_state {
     float transmittance, rgb[3];
-    float near, far, depth, median, normal[3], top_weight;
+    float near, far, depth, weight, median, normal[3], top_weight;
     uint32_t blended, top_id;
     bool alive;
     float dir[3];
@@ -45,7 +45,7 @@ static void finish_ray(const ray_state *r, const packet_rays *rays, int lane, pa
     }
     out->transmittance[lane] = r->transmittance;
     out->ended |= (unsigned)!r->alive << lane;
-    out->weighted_depth[lane] = r->depth, out->median_depth[lane] = r->median,
+    out->weighted_depth[lane] = r->depth, out->weight[lane] = r->weight, out->median_depth[lane] = r->median,
     out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
 }
 
@@ -71,6 +71,7 @@ static void note_hit(ray_state *r, const float *record, uint32_t id, float weigh
     for (int k = 0; k < 3; k++)
         r->normal[k] = fmaf(toward, normal[k], r->normal[k]);
     r->depth = fmaf(weight, t, r->depth);
+    r->weight += weight;
     if (next < 0.5f)
         r->median = smaller(r->median, t);
     r->blended++;

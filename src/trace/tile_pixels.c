@@ -134,22 +134,29 @@ void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int 
     }
 }
 
+/* A pixel without a ray: as a sky in no direction, cut as that is. */
+static float plain_background(const trace_settings *s, size_t c)
+{
+    const float color = s->background[c];
+    return !s->sky.varies ? color : color < 0 ? 0 : color > 1 ? 1 : color;
+}
+
 /* `o` NULL: the pixel has no ray. */
 static void store_pixel(const ray_image *rays, const kernel_scene *scene, const trace_outputs *out, size_t at,
                         const packet_output *o, int lane)
 {
     const float before = rays->near != NULL ? rays->through[at] : 1;
     for (size_t c = 0; c < 3; c++)
-        out->rgb->pixels[3 * at + c] = o == NULL ? before * scene->settings.background[c] : o->rgb[c][lane];
+        out->rgb->pixels[3 * at + c] =
+            o == NULL ? before * plain_background(&scene->settings, c) : o->rgb[c][lane];
     if (out->transmittance != NULL)
         out->transmittance[at] = o == NULL ? before : o->transmittance[lane];
     if (out->ended != NULL)
         out->ended[at] = o != NULL && (o->ended >> lane & 1) != 0;
     if (!scene->extra)
         return;
-    const float opacity = o == NULL ? 0 : 1 - o->transmittance[lane];
     if (out->depth != NULL)
-        out->depth[at] = opacity > 0 ? o->weighted_depth[lane] / opacity : 0;
+        out->depth[at] = o != NULL && o->weight[lane] > 0 ? o->weighted_depth[lane] / o->weight[lane] : 0;
     if (out->median_depth != NULL)
         out->median_depth[at] = o != NULL && isfinite(o->median_depth[lane]) ? o->median_depth[lane] : 0;
     for (size_t k = 0; k < 3 && out->normal != NULL; k++)

@@ -58,7 +58,7 @@ typedef struct trace_scene {
 typedef struct trace_outputs {
     image *rgb;           /* 3 channels, size of the rays, allocated by the caller; with the background */
     float *transmittance; /* what is left for the background, in [0, 1] */
-    float *depth;         /* expected t_c: sum of T alpha t_c / (1 - transmittance); 0 where nothing is hit */
+    float *depth;         /* expected t_c: sum of T alpha t_c / sum of T alpha; 0 where nothing is hit */
     float *median_depth;  /* t_c of the hit that takes T below 1/2; 0 where none does */
     float *normal; /* [3] sum of T alpha n; n: the shortest axis, unit, world, turned towards the ray's origin
                     */

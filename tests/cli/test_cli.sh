@@ -288,6 +288,10 @@ printf '{"frames": 5, "fps": 12, "up": [0, -1, 0], "fov_x_deg": 50, "width": 24,
 film "a film along a file" 5 along --path path.json
 cmp -s along/frame_00001.png plain/c.png
 report $? "its first frame is what that camera takes" "$(ls -l along plain)"
+"$program" render tiny -o around-3 --path orbit --frames 3 >out 2>err && ! grep -q "an earlier film" err
+report $? "frames that are all replaced are not told" "$(cat err)"
+"$program" render tiny -o around-3 --path orbit --frames 2 >out 2>err && grep -q '^warning: around-3: frames from 3 on are of an earlier film$' err
+report $? "frames that a longer film left are" "$(cat err)"
 film "a low, near orbit around a place" 3 low --path orbit --frames 3 --look-at 0,0.5,-1e-1 --radius 2 --height -0.5
 cmp -s low/frame_00001.png around/frame_00001.png
 [ $? = 1 ]
@@ -321,6 +325,11 @@ PATH=/nowhere "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>
 got=$?
 [ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
 report $? "a film without ffmpeg" "  got $got: $(cat err)"
+mkdir failing && printf '#!/bin/sh\ncat >/dev/null\nexit 1\n' >failing/ffmpeg && chmod +x failing/ffmpeg
+PATH=$PWD/failing:$PATH env --ignore-signal=CHLD "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>err
+got=$?
+[ "$got" = 4 ] && grep -q '^error: film.mp4: ffmpeg failed (code 1): it said nothing$' err && [ ! -e film.mp4 ] && [ ! -e .film.mp4.tmp ]
+report $? "an ffmpeg that fails, where how children end is ignored" "  got $got: $(cat err)"
 if command -v ffmpeg >/dev/null; then
     "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ] &&
         [ "$(cat out)" = film.gif ]

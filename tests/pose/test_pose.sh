@@ -63,6 +63,13 @@ export FALSE_COLMAP=feature_extractor-fails
 says "features fail: what it said, and the log" 4 "^error: colmap: failed (code 1): ERROR: no space left (log: fails/colmap/features.log)" pose "my photos" -o fails
 grep -q 'no space' fails/colmap/features.log && [ ! -e fails/sparse ]
 report $? "the log has it, and there is no model" "$(ls -R fails)"
+printf '#!/bin/sh\nexec env --ignore-signal=CHLD "%s" "$@"\n' "$program" >ignoring && chmod +x ignoring
+usual=$program
+program=$work/ignoring
+says "features fail, and who started us ignores how children end" 4 "^error: colmap: failed (code 1): ERROR: no space left" pose "my photos" -o ignored
+program=$usual
+[ ! -e ignored/colmap/features.done ]
+report $? "and are not done" "$(ls -R ignored)"
 export FALSE_COLMAP=mapper-fails
 says "mapping fails" 4 "^error: colmap: failed (code 1): ERROR: no space left" pose "my photos" -o fails
 export FALSE_COLMAP=mapper-dies

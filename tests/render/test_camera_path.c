@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_camera_path.c -- films: ways around and through cameras, path files, and pictures to
    ffmpeg and back. */
+#include <signal.h>
 #include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -401,6 +402,19 @@ static void through_all_keys(void **state)
     camera_path_free(&path);
 }
 
+/** 1e-9 of what keys look at is more than a unit. */
+static void through_keys_far_away(void **state)
+{
+    (void)state;
+    const double target[3] = {0, 0, 4e9};
+    const gbt_camera keys[2] = {looking(0, 0, 0, target), looking(2e9, 0, 0, target)};
+    camera_path path;
+    assert_ok(camera_path_through(keys, 2, 4e9, 3, &path, &assert_ok_err_));
+    assert_near(distance_between(&path.shots[0].camera, &keys[0]), 0, 1);
+    assert_near(distance_between(&path.shots[2].camera, &keys[1]), 0, 1);
+    camera_path_free(&path);
+}
+
 /** Two ways of writing the same turn, a turn on the spot, keys that repeat. */
 static void turning_on_the_spot(void **state)
 {
@@ -658,14 +672,18 @@ static void film_without_ffmpeg(void **state)
     memset(&err, 0, sizeof err);
     assert_int_equal(video_open(path, 15, 16, 30, &v, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "15 x 16 pixels (wanted even numbers"));
+    memset(&err, 0, sizeof err);
+    assert_int_equal(video_open("clip.gif", 16, 16, 60, &v, &err), GBT_ERR_ARGUMENT);
+    assert_string_equal(err.text, "clip.gif: 60 frames per second (wanted at most 50 in a .gif)");
     assert_true(video_named("a.webm") && video_named("b/a.gif") && !video_named(".mp4") &&
                 !video_named("mp4") && !video_named("a.mp4/"));
 }
 
-/** A program of that name which reads nothing, says something and fails. */
+/** A program of that name which reads nothing, says something and fails; how is not known where SIGCHLD is
+    ignored. */
 static void film_that_fails(void **state)
 {
-    (void)state;
+    const bool unknown = *state != NULL;
     char path[96], program[96], search[4096];
     video *v;
     gbt_error err = {0};
@@ -676,6 +694,7 @@ static void film_that_fails(void **state)
     assert_int_equal(chmod(program, 0755), 0);
     snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
     setenv("PATH", folder, 1);
+    signal(SIGCHLD, unknown ? SIG_IGN : SIG_DFL);
     const gbt_status opened = video_open(path, 256, 256, 30, &v, &err);
     setenv("PATH", search, 1);
     assert_int_equal(opened, GBT_OK);
@@ -684,8 +703,10 @@ static void film_that_fails(void **state)
     gbt_status status = GBT_OK;
     for (int i = 0; i < 100 && status == GBT_OK; i++) /* more than a socket holds */
         status = video_add(v, &picture, &err);
+    signal(SIGCHLD, SIG_DFL);
     assert_int_equal(status, GBT_ERR_IO);
-    assert_non_null(strstr(err.text, "clip.mp4: ffmpeg failed (code 7): no such encoder"));
+    assert_non_null(strstr(err.text, unknown ? "clip.mp4: ffmpeg failed (code 255): no such encoder"
+                                             : "clip.mp4: ffmpeg failed (code 7): no such encoder"));
     gbt_error ignored = {0};
     assert_int_equal(video_close(v, false, &ignored), GBT_OK);
     no_film_left(path);
@@ -693,11 +714,12 @@ static void film_that_fails(void **state)
     unlink(program);
 }
 
-/** Grey that grows from frame to frame, and back from the file. */
+/** Grey that grows from frame to frame, with a red last one, and back from the file; colours as BT.709. */
 static void film_and_back(void **state)
 {
     const char *const ending = *state;
-    enum { SIDE = 32, COUNT = 6 };
+    const float red[3] = {0.78f, 0.16f, 0.16f};
+    enum { SIDE = 32, COUNT = 6, PICTURE = 3 * SIDE * SIDE, MIDDLE = (SIDE / 2 * SIDE + SIDE / 2) * 3 };
     if (system("ffmpeg -version >/dev/null 2>&1") != 0) {
         print_message("ffmpeg is not there: skipped\n");
         skip();
@@ -710,22 +732,25 @@ static void film_and_back(void **state)
     assert_ok(video_open(path, SIDE, SIDE, 10, &v, &assert_ok_err_));
     assert_ok(image_alloc(&picture, SIDE, SIDE, 3, &assert_ok_err_));
     for (int frame = 0; frame < COUNT; frame++) {
-        for (int i = 0; i < 3 * SIDE * SIDE; i++)
-            picture.pixels[i] = 0.1f + 0.15f * (float)frame;
+        for (int i = 0; i < PICTURE; i++)
+            picture.pixels[i] = frame + 1 < COUNT ? 0.1f + 0.15f * (float)frame : red[i % 3];
         assert_ok(video_add(v, &picture, &assert_ok_err_));
     }
     assert_false(file_exists(path)); /* not before it is whole */
     assert_ok(video_close(v, true, &assert_ok_err_));
     snprintf(command, sizeof command,
-             "ffmpeg -nostdin -loglevel error -y -i %s -f rawvideo -pix_fmt rgb24 %s", path, raw);
+             "ffmpeg -nostdin -loglevel error -y -i %s -vf scale=in_color_matrix=bt709 -f rawvideo "
+             "-pix_fmt rgb24 %s",
+             path, raw);
     assert_int_equal(system(command), 0);
     unsigned char *bytes;
     size_t count;
     assert_ok(file_read(raw, &bytes, &count, &assert_ok_err_));
-    assert_int_equal(count, COUNT * 3 * SIDE * SIDE);
-    for (int frame = 0; frame < COUNT; frame++)
-        assert_near(bytes[(frame * SIDE + SIDE / 2) * SIDE * 3 + SIDE / 2 * 3], 255 * (0.1 + 0.15 * frame),
-                    6);
+    assert_int_equal(count, COUNT * PICTURE);
+    for (int frame = 0; frame + 1 < COUNT; frame++)
+        assert_near(bytes[frame * PICTURE + MIDDLE], 255 * (0.1 + 0.15 * frame), 6);
+    for (int k = 0; k < 3; k++)
+        assert_near(bytes[(COUNT - 1) * PICTURE + MIDDLE + k], 255 * (double)red[k], 4);
     mem_free(bytes);
     image_free(&picture);
     unlink(path);
@@ -746,6 +771,7 @@ int main(void)
         cmocka_unit_test(orbit_looks_as_the_cameras),
         cmocka_unit_test(orbit_shows_what_most_see),
         cmocka_unit_test(through_all_keys),
+        cmocka_unit_test(through_keys_far_away),
         cmocka_unit_test(turning_on_the_spot),
         cmocka_unit_test(order_to_go_through),
         cmocka_unit_test(our_file),
@@ -754,6 +780,9 @@ int main(void)
         cmocka_unit_test(says_what_is_wrong),
         cmocka_unit_test(film_without_ffmpeg),
         cmocka_unit_test(film_that_fails),
+        {.name = "film that fails: SIGCHLD ignored",
+         .test_func = film_that_fails,
+         .initial_state = "ignored"},
         {.name = "film and back: mp4", .test_func = film_and_back, .initial_state = "mp4"},
         {.name = "film and back: webm", .test_func = film_and_back, .initial_state = "webm"},
         {.name = "film and back: gif", .test_func = film_and_back, .initial_state = "gif"},

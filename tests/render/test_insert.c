@@ -7,6 +7,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "render/insert.h"
+#include "trace/footprint.h"
 #include "trace/reference.h"
 
 enum { W = 40, H = 24, COUNT = 300 };
@@ -42,13 +43,18 @@ static gaussians cloud(uint64_t seed, const double low[3], const double high[3])
 }
 
 /* A pinhole at the origin of the world that looks along z. */
+static gbt_camera pinhole(double focal)
+{
+    return (gbt_camera){.model = GBT_CAMERA_PINHOLE,
+                        .width = W,
+                        .height = H,
+                        .params = {focal, focal, 0.5 * W, 0.5 * H},
+                        .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+}
+
 static ray_image look(void)
 {
-    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
-                               .width = W,
-                               .height = H,
-                               .params = {30, 30, 0.5 * W, 0.5 * H},
-                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const gbt_camera camera = pinhole(30);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
     return rays;
@@ -57,12 +63,18 @@ static ray_image look(void)
 static const insert_object matt = {.material = INSERT_MATT, .color = {0.25f, 0.5f, 1}};
 static const insert_object mirror = {.material = INSERT_MIRROR, .color = {0.5f, 1, 0.25f}};
 
-/* The part left of x = right of the plane z = depth. */
-static void add_plane(insert_scene *in, const insert_object *object, float depth, float right)
+/* The part left of x = right of the plane z = depth, from -half on. */
+static void add_rectangle(insert_scene *in, const insert_object *object, float depth, float right, float half)
 {
-    const float vertices[12] = {-99, -99, depth, right, -99, depth, right, 99, depth, -99, 99, depth};
+    const float vertices[12] = {-half, -half, depth, right, -half, depth,
+                                right, half,  depth, -half, half,  depth};
     const uint32_t triangles[6] = {0, 1, 2, 2, 3, 0};
     assert_ok(insert_add(in, object, vertices, 4, triangles, 2, NULL));
+}
+
+static void add_plane(insert_scene *in, const insert_object *object, float depth, float right)
+{
+    add_rectangle(in, object, depth, right, 99);
 }
 
 typedef struct studio {
@@ -202,6 +214,50 @@ static void mirrored_camera(void **state)
     }
 }
 
+/* Mean squared difference from what the mirrored camera sees of st->g. */
+static double mirrored_error(const studio *st)
+{
+    double rgb[3 * W * H], left[W * H], sum = 0;
+    reference(st, &st->rays, rgb, left);
+    for (size_t i = 0; i < 3 * W * H; i++) {
+        const double seen = rgb[i] + left[i / 3] * (double)background[i % 3];
+        sum += pow((double)st->rgb.pixels[i] - (double)mirror.color[i % 3] * seen, 2);
+    }
+    return sum / (3 * W * H);
+}
+
+/* Rays as wide as pixels: Gaussians behind the camera, smaller than pixels, in a mirror right before it. */
+static void mirrored_pixels(void **state)
+{
+    (void)state;
+    insert_scene in = {.ambient = 1};
+    studio st = open_studio(3, -20, -10);
+    gbt_camera camera = pinhole(100);
+    footprint_view view = footprint_view_of(&camera);
+    gaussians thin = st.g;
+    st.g = (gaussians){0};
+    for (size_t i = 0; i < COUNT; i++)
+        thin.scale_x[i] /= 8, thin.scale_y[i] /= 8, thin.scale_z[i] /= 8;
+    assert_ok(footprint_forward(&view, 0.1f, NULL, &thin, &st.g, NULL));
+    ray_image_free(&st.rays);
+    assert_ok(ray_image_from_camera(&camera, &st.rays, NULL));
+    add_plane(&in, &mirror, 0.1f, 99);
+    shoot(&st, &in);
+    camera.center[2] = 0.2;
+    camera.rotation[8] = -1;
+    view = footprint_view_of(&camera);
+    assert_ok(footprint_forward(&view, 0.1f, NULL, &thin, &st.g, NULL));
+    st.rays.origin[2] = 0.2f;
+    for (size_t i = 0; i < W * H; i++)
+        st.rays.dir[3 * i + 2] *= -1;
+    const double wide_error = mirrored_error(&st);
+    gaussians_free(&st.g);
+    st.g = thin;
+    assert_true(wide_error < pow(10, -3.5));
+    assert_true(wide_error < 0.2 * mirrored_error(&st));
+    close_studio(&st, &in);
+}
+
 /* A smooth mirror whose vertices agree with its triangles is the same mirror. */
 static void smooth_plane(void **state)
 {
@@ -223,6 +279,30 @@ static void smooth_plane(void **state)
         close_studio(&st, &in);
     }
     image_free(&flat_rgb);
+}
+
+/* A plane far larger than what is seen of it is the same plane. The lamp sees it through the cloud. */
+static void plane_of_any_size(void **state)
+{
+    (void)state;
+    for (int mirrors = 0; mirrors < 2; mirrors++) {
+        image small_rgb = {0};
+        for (int large = 0; large < 2; large++) {
+            insert_scene in = {.ambient = 0.25f, .lamp = INSERT_LAMP_POINT, .lamp_at = {0.5, -0.5, 1}};
+            studio st = open_studio(3, mirrors ? -7 : 3, mirrors ? -1 : 7);
+            const float half = large ? 1e6f : 99;
+            add_rectangle(&in, mirrors ? &mirror : &matt, 7.5f, half, half);
+            shoot(&st, &in);
+            for (size_t i = 0; large && i < 3 * W * H; i++)
+                assert_near((double)st.rgb.pixels[i], (double)small_rgb.pixels[i], 1e-4);
+            if (!large) {
+                small_rgb = st.rgb;
+                st.rgb = (image){0};
+            }
+            close_studio(&st, &in);
+        }
+        image_free(&small_rgb);
+    }
 }
 
 /* Between two mirrors: four reflections, and the fifth surface is matt. */
@@ -369,6 +449,26 @@ static double lit(const double normal[3], const double point[3], const double la
     return ambient + (1 - ambient) * fabs(dvec_dot(d, normal));
 }
 
+/* The middle of a lamp of radius R is at the height h right above what a pixel sees: the mean cosine over its
+   disc has a closed form. */
+static void light_of_a_disc(void **state)
+{
+    (void)state;
+    const double h = 2, radius = 1.5, z = 5;
+    const size_t at = H / 2 * W + W / 2;
+    studio st = open_studio(1, 300, 310);
+    const float *d = st.rays.dir + 3 * at;
+    insert_scene in = {.lamp = INSERT_LAMP_POINT,
+                       .lamp_at = {z * (double)d[0] / (double)d[2], z * (double)d[1] / (double)d[2], z - h},
+                       .lamp_radius = radius};
+    add_plane(&in, &matt, (float)z, 99);
+    shoot(&st, &in);
+    const double light = 2 * h * (sqrt(h * h + radius * radius) - h) / (radius * radius);
+    for (size_t k = 0; k < 3; k++)
+        assert_near((double)st.rgb.pixels[3 * at + k], (double)matt.color[k] * light, 0.005);
+    close_studio(&st, &in);
+}
+
 /* The screen, -0.6 < x < -0.2 at z = 5, and its shadow, 1.8 < x < 2.6 at z = 7, each in the colour of its
    object. */
 static void shadow_on_a_mesh(void **state)
@@ -437,6 +537,34 @@ static void no_surface_hides_itself(void **state)
         }
         close_studio(&st, &in);
     }
+}
+
+/* Pixels without a ray have the background's colour, which a sky cuts to [0, 1], by whatever draws them. */
+static void no_rays(void **state)
+{
+    (void)state;
+    const double wanted[3] = {1, 0, (double)background[2]};
+    double rgb[3 * W * H], left[W * H];
+    insert_scene in = {.ambient = 1};
+    studio st = open_studio(1, 3, 7);
+    image plain = {0};
+    add_plane(&in, &mirror, 5, 99);
+    shoot(&st, &in);
+    assert_ok(image_alloc(&plain, W, H, 3, NULL));
+    memset(st.rays.dir, 0, 3 * W * H * sizeof *st.rays.dir);
+    trace_settings *s = &st.scene.settings;
+    s->background[0] = 1.2f;
+    s->background[1] = -0.1f;
+    s->sky.varies = true;
+    s->sky.harmonic[0][2] = 0.5f;
+    assert_ok(insert_trace(&in, &st.scene, &st.rays, &st.rgb, NULL));
+    assert_ok(trace_forward(&st.scene, &st.rays, false, &(trace_outputs){.rgb = &plain}, NULL, NULL));
+    assert_ok(reference_forward(&st.g, s, &st.rays, rgb, left, NULL, NULL));
+    for (size_t i = 0; i < 3 * W * H; i++)
+        assert_true((double)st.rgb.pixels[i] == wanted[i % 3] && (double)plain.pixels[i] == wanted[i % 3] &&
+                    rgb[i] == wanted[i % 3]);
+    image_free(&plain);
+    close_studio(&st, &in);
 }
 
 static void threads_agree(void **state)
@@ -516,11 +644,15 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(elsewhere_nothing_changes),
         cmocka_unit_test(mirrored_camera),
+        cmocka_unit_test(mirrored_pixels),
         cmocka_unit_test(smooth_plane),
+        cmocka_unit_test(plane_of_any_size),
         cmocka_unit_test(mirrors_end),
         cmocka_unit_test(shadow_on_gaussians),
         cmocka_unit_test(shadow_on_a_mesh),
+        cmocka_unit_test(light_of_a_disc),
         cmocka_unit_test(no_surface_hides_itself),
+        cmocka_unit_test(no_rays),
         cmocka_unit_test(threads_agree),
         cmocka_unit_test(a_corner_that_is_no_vertex),
         cmocka_unit_test(without_memory),

@@ -56,12 +56,15 @@ static void test_sizes(void **state)
 {
     (void)state;
     gbt_camera c = camera_of(GBT_CAMERA_PINHOLE);
+    c.width = 160, c.height = 120, c.params[2] = 80, c.params[3] = 60; /* 51 degrees to the corners */
     footprint_view view = footprint_view_of(&c);
     assert_true(fabs(footprint_pixel(&view, (double[]){0.3, -0.2, 2}) - 8 / 80.0) < 1e-12);
     /* 45 degrees off the axis at distance t: t cos^(3/2) / f */
     assert_true(fabs(footprint_pixel(&view, (double[]){2.3, -0.2, -4}) - sqrt(8) * pow(0.5, 0.75) / 80) <
                 1e-12);
-    assert_true(footprint_pixel(&view, (double[]){0, 0, -7}) == 0); /* behind */
+    /* behind: as in a corner, where the tangent is 1.25 */
+    assert_true(fabs(footprint_pixel(&view, (double[]){0, 0, -7}) - sqrt(1.13) * pow(2.5625, -0.75) / 80) <
+                1e-12);
     assert_true(footprint_pixel(&view, c.center) == 0);
     c = camera_of(GBT_CAMERA_ORTHOGRAPHIC);
     view = footprint_view_of(&c);
@@ -182,6 +185,7 @@ static void test_adjoint(void **state)
         const gbt_camera c = camera_of(models[seed % 4]);
         const footprint_view view = footprint_view_of(&c);
         footprint_gaussian g = random_gaussian(seed), weights = random_gaussian(seed + 100);
+        g.mean[2] -= seed % 16 == 8 ? 12 : 0; /* behind a pinhole */
         for (int i = 0; i < NUMBERS; i++)
             *number_of(&g, i) = (double)(float)*number_of(&g, i);
         const double pixel_min = seed % 8 >= 4 ? (double)(float)(2 * footprint_pixel(&view, g.mean)) : 0;

@@ -230,6 +230,35 @@ static void all_kernels_all_outputs(void **state)
         }
 }
 
+/* Where next to nothing of a Gaussian is hit, its depth is known all the same. */
+static void depth_of_faint_hits(void **state)
+{
+    (void)state;
+    gaussians g = cloud(1, 0, 0, 1, 1);
+    ray_image rays = make_rays(false);
+    trace_settings s = trace_settings_default();
+    s.alpha_min = 1e-5f;
+    g.scale_x[0] = g.scale_y[0] = g.scale_z[0] = 0.2f;
+    g.opacity[0] = 0.9f;
+    const double way[3] = {-0.3, 0.2, 5}; /* from the rays' origin to the Gaussian, which is at 0 */
+    for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
+        pass_result *r = run(&g, &s, &rays, (trace_kernel)kernel, 0);
+        int faint = 0;
+        for (size_t i = 0; i < RAYS; i++) {
+            const double d[3] = {(double)rays.dir[3 * i], (double)rays.dir[3 * i + 1],
+                                 (double)rays.dir[3 * i + 2]},
+                         t = dvec_dot(d, way);
+            if (r->hit_count[i] > 0)
+                assert_near((double)r->depth[i], t, 1e-5 * t);
+            faint += r->hit_count[i] > 0 && r->transmittance[i] > 0.9999f;
+        }
+        assert_true(faint > 10);
+        pass_free(r);
+    }
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 /* The adjoint of every kernel's hits is that of the tile kernel, to rounding. */
 static void kernels_share_the_adjoint(void **state)
 {
@@ -498,9 +527,13 @@ static void hits_are_sorted(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_kernels_all_outputs), cmocka_unit_test(kernels_share_the_adjoint),
-        cmocka_unit_test(surfaces_and_radius),     cmocka_unit_test(parts_of_rays),
-        cmocka_unit_test(hits_are_sorted),         cmocka_unit_test(no_room_for_the_tape),
+        cmocka_unit_test(all_kernels_all_outputs),
+        cmocka_unit_test(depth_of_faint_hits),
+        cmocka_unit_test(kernels_share_the_adjoint),
+        cmocka_unit_test(surfaces_and_radius),
+        cmocka_unit_test(parts_of_rays),
+        cmocka_unit_test(hits_are_sorted),
+        cmocka_unit_test(no_room_for_the_tape),
         cmocka_unit_test(rows_are_in_exact_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

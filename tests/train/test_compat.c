@@ -258,6 +258,60 @@ static void voxels_are_where_the_world_puts_them(void **state)
     trainer_free(&t);
 }
 
+/* The tiny scene as one of Blender's: photos with an alpha channel, no points. */
+static void write_blender(const char *folder)
+{
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    char path[PATH_SIZE];
+    assert_ok(file_make_folder(folder, NULL));
+    snprintf(path, sizeof path, "%s/train", folder);
+    assert_ok(file_make_folder(path, NULL));
+    snprintf(path, sizeof path, "%s/transforms_train.json", folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    const gbt_camera *c = &s.views[0].camera;
+    fprintf(file, "{\"camera_angle_x\": %.17g, \"frames\": [", 2 * atan(0.5 * c->width / c->params[0]));
+    for (size_t i = 0; i < s.view_count; i++) {
+        image photo, with_alpha;
+        assert_ok(image_read(s.views[i].path, &photo, NULL));
+        assert_ok(image_alloc(&with_alpha, photo.width, photo.height, 4, NULL));
+        for (int p = 0; p < photo.width * photo.height; p++) {
+            memcpy(with_alpha.pixels + 4 * p, photo.pixels + photo.channels * p, 3 * sizeof(float));
+            with_alpha.pixels[4 * p + 3] = p > 0;
+        }
+        snprintf(path, sizeof path, "%s/train/%zu.png", folder, i);
+        assert_ok(image_write(path, &with_alpha, NULL));
+        image_free(&with_alpha);
+        image_free(&photo);
+        const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
+        fprintf(file, "%s{\"file_path\": \"./train/%zu\", \"transform_matrix\": [", i > 0 ? ", " : "", i);
+        for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
+            fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
+        fprintf(file, "[0, 0, 0, 1]]}");
+    }
+    fprintf(file, "]}\n");
+    assert_int_equal(fclose(file), 0);
+    scene_free(&s);
+}
+
+static void scenes_of_blender_lie_on_black(void **state)
+{
+    (void)state;
+    const char *folder = in_root("blender");
+    write_blender(folder);
+    for (int compat = 0; compat <= 1; compat++) {
+        const gbt_train_def def = def_of(compat == 1);
+        trainer t;
+        open_ok(&t, folder, &def);
+        assert_string_equal(t.scene.source, "blender");
+        for (int c = 0; c < 3; c++)
+            assert_true(t.settings.background[c] == (compat == 1 ? 0.0f : 1.0f));
+        trainer_free(&t);
+    }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
@@ -272,6 +326,7 @@ int main(void)
         cmocka_unit_test(nothing_is_nearer_than_a_fifth),
         cmocka_unit_test(anchors_are_seen_by_themselves),
         cmocka_unit_test(voxels_are_where_the_world_puts_them),
+        cmocka_unit_test(scenes_of_blender_lie_on_black),
     };
     return cmocka_run_group_tests_name("compat", tests, make_root, remove_root);
 }

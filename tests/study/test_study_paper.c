@@ -56,6 +56,24 @@ static void figures_as_text(void **state)
         assert_memory_equal(out.bytes, cases[i].wanted, out.length);
         text_free(&out);
     }
+    /* 95 %: 4.3 standard deviations of the mean of three, 12.7 of two. */
+    const struct {
+        double values[3];
+        size_t count;
+        const char *wanted;
+    } judged[] = {{{-2.4, -2, -2.2}, 3, "**-2.2 ± 0.2**"},
+                  {{-3, -1, -2}, 3, "-2.0 ± 1.0"},
+                  {{-2.4, -2}, 2, "-2.2 ± 0.3"},
+                  {{-2}, 1, "-2.0"},
+                  {{0, 0}, 2, "0.0 ± 0.0"}};
+    for (size_t i = 0; i < sizeof judged / sizeof *judged; i++) {
+        text out = {0};
+        const stat_sample s = stat_of(judged[i].values, judged[i].count);
+        stat_add_judged(&out, &s, 1);
+        assert_int_equal(out.length, strlen(judged[i].wanted));
+        assert_memory_equal(out.bytes, judged[i].wanted, out.length);
+        text_free(&out);
+    }
 }
 
 /* Halves of halves, counted one by one. */
@@ -445,8 +463,8 @@ static void runs_are_made_once(void **state)
                                                                                  the runs are those of D_max
                                                                                  18 */
     char *page = read_text(in_root("paper/paper.md"));
-    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | **0.0 ± "
-                                    "0.0** | -6.0 |  | none at all |"),
+    assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | 0.0 ± "
+                                    "0.0 | -6.0 |  | none at all |"),
                      1);
     mem_free(page);
     mem_free(csv.data);
@@ -531,13 +549,14 @@ static void quality_against_time(void **state)
         assert_near(json_number_value(json_object_get(psnr, "mean")), metric_of(run, "psnr"), 1e-6);
         assert_true(metric_of(run, "train_seconds") >= 0.9 * time_variants[v].budgets * 0.1);
     }
-    char *config = read_text(in_root("time/runs/tiny/faithful-protocol/seed-0/config"));
+    char *config = read_text(in_root("time/runs/tiny/faithful-protocol--splats/seed-0/config"));
     assert_non_null(strstr(config, "\ncompat = 1\n"));
+    assert_non_null(strstr(config, "\nrenderer = raster\n")); /* as the paper and its reference */
     mem_free(config);
     json_decref(whole);
 
     char *page = read_text(in_root("time/time.md")), *svg = read_text(in_root("time/time.svg"));
-    assert_int_equal(count_of(page, "| faithful protocol |"), 2);
+    assert_int_equal(count_of(page, "| faithful protocol, splats |"), 2);
     assert_int_equal(count_of(page, "The faithful protocol ends at "), 1);
     assert_true(count_of(svg, ">no growth<") <= 1 && count_of(svg, "no growth") >= 1 &&
                 strstr(svg, "nan") == NULL);

@@ -159,6 +159,7 @@ typedef struct lab_runs_def {
     uint64_t iterations;   /* "paper" and "anchors": of every run, at least 20. Default 0: 3000 and 1000; the
                               paper's is 30000 */
     double budget_seconds; /* "time": of a run, (0, 1e6]. Default 84 */
+    double voxel_size;     /* "paper": v, scene units, [0, 1e9]. Default 0: the reference's, of the points */
     gbt_renderer renderer; /* "paper": that trains. Default GBT_RENDERER_RASTER, as the paper */
     const char *tables;    /* "paper": which, as "1,3". Default "1,2,3,4" */
     const char *lpips; /* "paper": .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such

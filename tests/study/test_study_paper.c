@@ -111,9 +111,11 @@ static void constant_of_pairs(void **state)
     const char *path = in_root("pairs.ply");
     assert_ok(file_write_atomic(path, ply, sizeof ply - 1, NULL));
     paper_scene look;
-    assert_ok(paper_scene_look(path, &look, NULL));
+    assert_ok(paper_scene_look(path, 0, &look, NULL));
     assert_int_equal(look.tree_depth, 1);
     assert_near(look.scale_constant, 0.625, 1e-6);
+    assert_ok(paper_scene_look(path, 1, &look, NULL)); /* all is one compact ball then */
+    assert_int_equal(look.tree_depth, 0);
 }
 
 static void what_the_paper_says(void **state)
@@ -477,6 +479,11 @@ static void runs_are_made_once(void **state)
     assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), before[0][0]));
     assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-1")), before[0][1]));
     assert_near(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "iterations"), 41, 0);
+
+    const double finer = metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "anchors_initial");
+    other.voxel_size = 1;
+    paper_ok(&other, in_root("paper"));
+    assert_true(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "anchors_initial") < finer);
 }
 
 static void bad_requests(void **state)

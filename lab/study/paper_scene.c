@@ -38,6 +38,7 @@ static gbt_status make_anchors(const scene_points *points, double voxel_size, gb
 {
     anchor_init_def def = anchor_init_def_default();
     def.scale = scale;
+    def.balls.min_radius = BALLS_PAPER_MIN_RADIUS;
     def.balls.voxel_size = (float)voxel_size;
     if (voxel_size == 0)
         GBT_TRY(balls_voxel_size(points->position, points->count, GBT_VOXEL_RULE_SQUARED,

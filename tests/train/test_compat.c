@@ -167,6 +167,7 @@ static void the_other_rules_are_the_references(void **state)
     for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
         assert_true(t.anchors.feature[i] == 0);
     assert_int_equal(r->voxel, GBT_VOXEL_RULE_SQUARED);
+    assert_true(r->ball_radius_min == 1e-6f);
     assert_true(r->integer_division && r->coarse_level_gates && r->at_cell_center);
     assert_true(!r->own_adam_age && r->importance == GROWTH_BY_OPACITY && r->shape_log_max == 0.05f);
     assert_true(!r->thresholds_by_length && !r->grows_at_points && !r->needs_two_views);

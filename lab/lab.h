@@ -181,8 +181,9 @@ lab_runs_def lab_runs_def_default(void);
 gbt_status lab_study_paper(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
- * Held-out PSNR against seconds: the default settings against the faithful protocol, which is given five
- * budgets, and what each choice of the default is worth, one left out at a time.
+ * Held-out PSNR against seconds: the default settings against the faithful protocol (with splats, so cameras
+ * are pinholes), which is given five budgets, and what each choice of the default is worth, one left out at a
+ * time.
  *
  * Writes time.md, .csv (every mark of every run), .json and .svg into `folder`, and the tables as Markdown to
  * `out`.

@@ -62,6 +62,37 @@ static void statistics_are_of_steps_501_to_14999(void **state)
     assert_int_equal(steps.last, 14999);
 }
 
+/* I of the first two rounds: the views of the steps that gathered; of the reference 100 always. */
+static void rounds_count_what_was_gathered(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t steps;
+        bool compat, refine_poses;
+        float first;
+    } cases[] = {{1200, false, false, 52}, /* steps 20 to 71 */
+                 {2400, false, false, 100},
+                 {3000, false, true, 30},
+                 {WHOLE, true, false, 100}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trainer t = {.def = def_of(cases[i].compat), .pace = pace_of_iterations(cases[i].steps)};
+        t.def.refine_poses = cases[i].refine_poses;
+        t.rules = train_rules_of(&t.def);
+        float gathered = 0;
+        for (int round = 0; round < 2; t.step++) {
+            gathered += growing_gathers(&t);
+            if (!growing_is_due(&t))
+                continue;
+            const float interval = growing_interval(&t);
+            assert_true(round > 0 || interval == cases[i].first);
+            assert_true(interval == (cases[i].compat ? 100 : fminf(fmaxf(gathered, 20), 100)));
+            t.round_step = t.step + 1;
+            gathered = 0;
+            round++;
+        }
+    }
+}
+
 /* Growth to a third of the run ends before step 10,000, though a third is no double. */
 static void growth_ends_before_its_last_step(void **state)
 {
@@ -318,6 +349,7 @@ int main(void)
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(there_are_134_rounds),
         cmocka_unit_test(statistics_are_of_steps_501_to_14999),
+        cmocka_unit_test(rounds_count_what_was_gathered),
         cmocka_unit_test(growth_ends_before_its_last_step),
         cmocka_unit_test(rates_count_from_one),
         cmocka_unit_test(the_last_step_teaches_nothing),

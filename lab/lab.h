@@ -160,6 +160,7 @@ typedef struct lab_runs_def {
     uint64_t iterations;   /* "paper" and "anchors": of every run, at least 20. Default 0: 3000 and 1000; the
                               paper's is 30000 */
     double budget_seconds; /* "time": of a run, (0, 1e6]. Default 84 */
+    double voxel_size;     /* "paper": v, scene units, [0, 1e9]. Default 0: the reference's, of the points */
     gbt_renderer renderer; /* "paper": that trains. Default GBT_RENDERER_RASTER, as the paper */
     const char *tables;    /* "paper": which, as "1,3". Default "1,2,3,4" */
     const char *lpips; /* "paper": .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such
@@ -181,8 +182,9 @@ lab_runs_def lab_runs_def_default(void);
 gbt_status lab_study_paper(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err);
 
 /**
- * Held-out PSNR against seconds: the default settings against the faithful protocol, which is given five
- * budgets, and what each choice of the default is worth, one left out at a time.
+ * Held-out PSNR against seconds: the default settings against the faithful protocol (with splats, so cameras
+ * are pinholes), which is given five budgets, and what each choice of the default is worth, one left out at a
+ * time.
  *
  * Writes time.md, .csv (every mark of every run), .json and .svg into `folder`, and the tables as Markdown to
  * `out`.

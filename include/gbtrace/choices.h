@@ -38,7 +38,7 @@ typedef enum gbt_distance_input {
 
 /** What the transparent part of photos is. */
 typedef enum gbt_alpha {
-    GBT_ALPHA_AUTO, /* white for Blender's synthetic scenes, else black */
+    GBT_ALPHA_AUTO, /* white for Blender's synthetic scenes, else and with compat black */
     GBT_ALPHA_BLACK,
     GBT_ALPHA_WHITE,
     GBT_ALPHA_MASK /* it counts neither in the loss nor in the scores */

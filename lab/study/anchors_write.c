@@ -77,7 +77,7 @@ static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
     text_add(out, " | ");
     stat_add(out, &final, 0, false);
     text_add(out, " | ");
-    stat_add(out, &psnr, 2, true);
+    stat_add_judged(out, &psnr, 2);
     text_add(out, " | ");
     text_number(out, times_smaller(s, scene, v), 1);
     text_add(out, " |\n");
@@ -93,8 +93,9 @@ static void add_tables(const void *study, text *out)
                 s->def.eval_split);
     text_format(out,
                 "Mean ± standard deviation over the seeds. Times smaller: model.gbt against %d bytes, as the "
-                "paper counts, for each final anchor of the voxels. The voxels are those of the first row.\n",
+                "paper counts, for each final anchor of the voxels. The voxels are those of the first row. ",
                 (int)PAPER_BYTES_PER_ANCHOR);
+    text_add(out, STAT_BOLD_MEANS "\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
         text_plain(out, s->grid.names[scene]);

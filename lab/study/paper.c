@@ -31,7 +31,7 @@ static gbt_status plan(paper_study *s, gbt_error *err)
                          (unsigned long long)def->iterations, (int)LEAST_ITERATIONS);
     GBT_TRY(choose_tables(def->tables, s->has_table, err));
     for (size_t i = 0; i < s->grid.scene_count; i++)
-        GBT_TRY(paper_scene_look(def->data[i], &s->scenes[i], err));
+        GBT_TRY(paper_scene_look(def->data[i], def->voxel_size, &s->scenes[i], err));
     for (int table = 1; table <= PAPER_TABLES; table++) {
         const paper_variant_id *variants;
         const size_t count = paper_table_variants(table, &variants);
@@ -62,6 +62,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     def.iterations = s->def.iterations;
     def.downscale = s->def.downscale;
     def.renderer = s->def.renderer;
+    def.voxel_size = (float)s->def.voxel_size;
     def.seed = (uint64_t)seed;
     def.init = v->init;
     def.scale_prior = v->scale_prior;

@@ -56,8 +56,9 @@ typedef struct paper_scene {
                               geometric mean */
 } paper_scene;
 
-/** The constant and the depth, from the sparse points; without points 0.625 and no limit to the depth. */
-gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err);
+/** The constant and the depth, from the sparse points and v (0: the reference's); without points 0.625 and
+    no limit to the depth. */
+gbt_status paper_scene_look(const char *data, double voxel_size, paper_scene *out, gbt_error *err);
 
 /** How many balls `points` points without ties give: every set of more than two is halved, down to
     `max_depth`. */

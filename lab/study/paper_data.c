@@ -111,8 +111,8 @@ static json_t *data_of(const void *study)
                 json_array_append_new(figures, variant_to_json(s, scene, (paper_variant_id)v));
     }
     add_change_rows(s, rows);
-    return json_pack("{s:I,s:f,s:s,s:i,s:o,s:o,s:o}", "iterations", (json_int_t)s->def.iterations,
-                     "downscale", s->def.downscale, "renderer",
+    return json_pack("{s:I,s:f,s:f,s:s,s:i,s:o,s:o,s:o}", "iterations", (json_int_t)s->def.iterations,
+                     "downscale", s->def.downscale, "voxel_size", s->def.voxel_size, "renderer",
                      CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer), "seeds", s->grid.seeds, "rows", rows,
                      "scenes", scenes, "figures", figures);
 }

@@ -33,24 +33,28 @@ double paper_ball_count(double points, int max_depth)
 }
 
 /* As training with `compat` makes them. */
-static gbt_status make_anchors(const scene_points *points, gbt_scale_prior scale, anchors *out,
-                               balls *out_balls, gbt_error *err)
+static gbt_status make_anchors(const scene_points *points, double voxel_size, gbt_scale_prior scale,
+                               anchors *out, balls *out_balls, gbt_error *err)
 {
     anchor_init_def def = anchor_init_def_default();
     def.scale = scale;
-    GBT_TRY(balls_voxel_size(points->position, points->count, GBT_VOXEL_RULE_SQUARED, &def.balls.voxel_size,
-                             err));
+    def.balls.min_radius = BALLS_PAPER_MIN_RADIUS;
+    def.balls.voxel_size = (float)voxel_size;
+    if (voxel_size == 0)
+        GBT_TRY(balls_voxel_size(points->position, points->count, GBT_VOXEL_RULE_SQUARED,
+                                 &def.balls.voxel_size, err));
     return anchors_init(points->position, points->has_color ? points->color : NULL, points->count, &def, out,
                         out_balls, err);
 }
 
-static gbt_status look_at_points(const scene_points *points, paper_scene *out, gbt_error *err)
+static gbt_status look_at_points(const scene_points *points, double voxel_size, paper_scene *out,
+                                 gbt_error *err)
 {
     anchors prior = {0}, spacing = {0};
     balls found = {0};
-    gbt_status status = make_anchors(points, GBT_SCALE_PRIOR_GB, &prior, &found, err);
+    gbt_status status = make_anchors(points, voxel_size, GBT_SCALE_PRIOR_GB, &prior, &found, err);
     if (status == GBT_OK)
-        status = make_anchors(points, GBT_SCALE_PRIOR_NN, &spacing, NULL, err);
+        status = make_anchors(points, voxel_size, GBT_SCALE_PRIOR_NN, &spacing, NULL, err);
     if (status == GBT_OK) {
         double sum = 0;
         out->tree_depth = 0;
@@ -66,13 +70,13 @@ static gbt_status look_at_points(const scene_points *points, paper_scene *out, g
     return status;
 }
 
-gbt_status paper_scene_look(const char *data, paper_scene *out, gbt_error *err)
+gbt_status paper_scene_look(const char *data, double voxel_size, paper_scene *out, gbt_error *err)
 {
     scene s;
     out->tree_depth = INT_MAX;
     out->scale_constant = constant_of_singletons;
     GBT_TRY(scene_load_in_place(data, NULL, &s, err));
-    const gbt_status status = s.points.count > 0 ? look_at_points(&s.points, out, err) : GBT_OK;
+    const gbt_status status = s.points.count > 0 ? look_at_points(&s.points, voxel_size, out, err) : GBT_OK;
     scene_free(&s);
     return status;
 }

@@ -102,13 +102,13 @@ static void add_change_row(const paper_study *s, const paper_claim *claim, text 
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         const stat_sample change = paper_change(s, scene, claim->variant, claim->base, claim->figure);
         text_add(out, " ");
-        stat_add(out, &change, figure->change_decimals, true);
+        stat_add_judged(out, &change, figure->change_decimals);
         text_add(out, " |");
     }
     const stat_sample all = paper_change(s, PAPER_ALL, claim->variant, claim->base, claim->figure);
-    text_add(out, " **");
-    stat_add(out, &all, figure->change_decimals, true);
-    text_add(out, "** | ");
+    text_add(out, " ");
+    stat_add_judged(out, &all, figure->change_decimals);
+    text_add(out, " | ");
     if (isfinite(published))
         stat_add_change(out, published, figure->change_decimals);
     text_add(out, " | ");
@@ -158,10 +158,13 @@ void paper_tables(const void *study, text *out)
                 "(`--compat`), photos divided by %g, %s, ",
                 (unsigned long long)s->def.iterations, s->def.downscale,
                 CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer));
+    if (s->def.voxel_size > 0)
+        text_format(out, "voxel size %g, ", s->def.voxel_size);
     text_format(out, "seeds 0 to %d; held-out photos: %s.\n", s->grid.seeds - 1, s->def.eval_split);
     text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" "
-                  "is the mean over the scenes. Told apart: outside the 95 % interval of the mean (Student's "
-                  "t over the seeds). The paper gives single runs on other scenes.\n\n");
+                  "is the mean of the scenes' changes, the paper's the change of the sum over its scenes. "
+                  "Told apart: outside the 95 % interval of the mean. " STAT_BOLD_MEANS
+                  " The paper gives single runs on other scenes.\n\n");
     add_scenes(s, out);
     for (int table = 1; table <= PAPER_TABLES; table++) {
         if (!s->has_table[table])

@@ -58,6 +58,14 @@ void stat_add(text *out, const stat_sample *s, int decimals, bool is_change)
         text_format(out, " ± %.*f", decimals, s->deviation);
 }
 
+void stat_add_judged(text *out, const stat_sample *s, int decimals)
+{
+    const char *mark = stat_is_apart(s, 0) ? "**" : "";
+    text_add(out, mark);
+    stat_add(out, s, decimals, true);
+    text_add(out, mark);
+}
+
 void stat_csv_text(text *out, const char *outside)
 {
     text_add(out, "\"");

@@ -29,6 +29,12 @@ bool stat_is_apart(const stat_sample *s, double value);
     positive. */
 void stat_add(text *out, const stat_sample *s, int decimals, bool is_change);
 
+/** stat_add() of a change, bold when zero is outside the 95 % interval of the mean. */
+void stat_add_judged(text *out, const stat_sample *s, int decimals);
+
+/** What bold cells of a page mean. */
+#define STAT_BOLD_MEANS "Bold: zero is outside the 95 % interval of the mean (Student's t over the seeds)."
+
 /** "+1.23", "-1.23", "0.00" for what rounds to that; `value` is finite. */
 void stat_add_change(text *out, double value, int decimals);
 

@@ -7,7 +7,7 @@
    come and go. A new meaning needs a new name: the name is the folder of the runs. */
 const time_variant time_variants[] = {
     {"default", "", 1},
-    {"faithful protocol", "compat = 1", 5},
+    {"faithful protocol, splats", "compat = 1\nrenderer = raster", 5},
     {"all pixels from the start", "start-level = 0", 1},
     {"splats first", "splats-until = 0.7", 1},
     {"first scales x 1", "scale-factor = 1", 1},

@@ -60,7 +60,7 @@ static void add_variants(const time_study *s, size_t scene, text *out)
         stat_add(out, &psnr, 2, false);
         text_add(out, " | ");
         if (v != TIME_DEFAULT)
-            stat_add(out, &change, 2, true);
+            stat_add_judged(out, &change, 2);
         text_add(out, " |\n");
     }
 }
@@ -96,7 +96,8 @@ static void add_tables(const void *study, text *out)
     text_format(out, "seeds 0 to %d, held-out photos: %s.\n", s->grid.seeds - 1, s->def.eval_split);
     text_add(out, "Mean ± standard deviation over the seeds. Marks are taken in passing, while the clock "
                   "stops: schedules end with the budget, so a run of half the budget has more than the mark "
-                  "at half. Each run but the first two leaves one choice of the default out.\n");
+                  "at half. Each run but the first two leaves one choice of the default out. " STAT_BOLD_MEANS
+                  "\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         text_add(out, "\n## ");
         text_plain(out, s->grid.names[scene]);

@@ -38,9 +38,10 @@ typedef struct decode_tape {
  * Input of the networks: feature, unit direction from the camera to the anchor ((0, 0, 1) for a camera on the
  * anchor), distance if the decoder has it. Gaussian k of anchor i: opacity = alpha = tanh(.), mean = x +
  * offset exp(l[0..2]), scale = exp(l[3..5]) sigmoid(c[0..2]), quaternion = c[3..6] normalised, colour =
- * sigmoid(.). Log-scales and logits are cut to [-30, 30], where their gradient ends too. A scale below 1e-4
- * of the Gaussian's largest is raised to that: its gradient is then the largest one's. It is kept iff its
- * alpha > `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
+ * sigmoid(.). Log-scales are cut to [-30, 30], where their gradient ends; sigmoid's arguments to [-30, 30]
+ * and tanh's to [-10, 10], where their slopes, taken from the values, are almost 0. A scale below 1e-4 of the
+ * Gaussian's largest is raised to that: its gradient is then the largest one's. It is kept iff its alpha >
+ * `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
  *
  * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
  * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters

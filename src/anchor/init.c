@@ -140,8 +140,7 @@ static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor
                          .def = def,
                          .radius = radius,
                          .squared = squared,
-                         .floor_scale =
-                             fmax((double)def->balls.min_scale * (double)def->balls.voxel_size, 1e-6)};
+                         .floor_scale = balls_least_radius(&def->balls)};
         parallel_blocks(a->count, 1024, prior_block, &job);
     }
     mem_free(index);

@@ -33,9 +33,9 @@ anchor_init_def anchor_init_def_default(void);
  *
  * GBT_SCALE_PRIOR_NN: root mean square distance to the 3 nearest anchors (or as many as there are), floor
  * ANCHOR_SPACING_LEAST(), of voxels sqrt(1e-7); a lone anchor takes the voxel size. GBT_SCALE_PRIOR_GB: eqs
- * 29-34 with the nearest anchor, floor max(gamma v, 1e-6); an anchor that is alone or coincides with another
- * takes its ball's radius for the spacing. Then all are multiplied by scale_factor; scale_max wins over
- * floors and factor. No points give no anchors.
+ * 29-34 with the nearest anchor, floor balls_least_radius(); an anchor that is alone or coincides with
+ * another takes its ball's radius for the spacing. Then all are multiplied by scale_factor; scale_max wins
+ * over floors and factor. No points give no anchors.
  *
  * @param position  [in] [count][3], finite
  * @param color     [in] [count][3] in [0, 1], or NULL

@@ -19,7 +19,10 @@
 #include "gb/fill.h"
 #include "gb/joint.h"
 
-enum { MEANS_ROUNDS = 16 }; /* of 2-means; it settles in about five */
+enum {
+    MEANS_ROUNDS = 16, /* of 2-means; it settles in about five */
+    DEPTH_MAX = 254    /* depths are counted from 1 in bytes */
+};
 
 adaptive_def adaptive_def_default(void) { return (adaptive_def){.color_unit = 0.1f, .min_scale = 0.25f}; }
 
@@ -105,7 +108,7 @@ static double nats_of(const cutter *c, const cloud_point *points, size_t count)
 static waiting prepare(const cutter *c, size_t begin, size_t count, int depth)
 {
     waiting w = {.begin = (uint32_t)begin, .count = (uint32_t)count, .depth = (uint8_t)depth};
-    if (count < 2 || depth >= BALL_DEPTH_MAX)
+    if (count < 2 || depth >= DEPTH_MAX)
         return w;
     cloud_point *points = c->points + begin;
     joint_moments m;

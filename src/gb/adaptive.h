@@ -23,7 +23,7 @@ adaptive_def adaptive_def_default(void);
  * A set costs L = n / 2 ln det(I + C) nats (a coding length as in Ma 2007), C being the covariance of y = (x
  * / v, colour / tau). The set whose cut saves the most, L(set) - L(left) - L(right), is cut next: along the
  * principal axis of C, between the two means that the points fall into (2-means along the axis, from the
- * mean: the split of Xia 2019). Sets of points that are all in one place are not cut, nor sets at depth 64.
+ * mean: the split of Xia 2019). Sets of points that are all in one place are not cut, nor sets at depth 254.
  * The balls for m are those for m + 1 with two of them joined. Without ties they do not depend on the order
  * of the points; equal savings are taken from the left.
  *

@@ -39,6 +39,11 @@ balls_def balls_def_default(void)
                        .min_scale = 0.25f};
 }
 
+double balls_least_radius(const balls_def *def)
+{
+    return fmax(fmax((double)def->min_scale, 1e-6) * (double)def->voxel_size, (double)def->min_radius);
+}
+
 static gbt_status check_def(const balls_def *def, gbt_error *err)
 {
     if (!(def->voxel_size > 0.0f) || !isfinite(def->voxel_size))
@@ -59,6 +64,9 @@ static gbt_status check_def(const balls_def *def, gbt_error *err)
     if (!(def->min_scale >= 0.0f) || !isfinite(def->min_scale))
         return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_scale (wanted >= 0, got %g)",
                          (double)def->min_scale);
+    if (!(def->min_radius >= 0.0f) || !isfinite(def->min_radius))
+        return base_fail(err, GBT_ERR_ARGUMENT, "balls: bad min_radius (wanted >= 0, got %g)",
+                         (double)def->min_radius);
     return GBT_OK;
 }
 
@@ -194,7 +202,7 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
     partition p = {.color = color,
                    .radius_compact = (double)def->radius_factor * voxel_size,
                    .radius_tied = KEPT_SPACINGS * voxel_size,
-                   .radius_floor = fmax((double)def->min_scale * voxel_size, 1e-6),
+                   .radius_floor = balls_least_radius(def),
                    .color_std_max = (double)def->color_std_max,
                    .min_points = (size_t)def->min_points,
                    .max_depth = def->max_depth};

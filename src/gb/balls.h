@@ -17,10 +17,18 @@ typedef struct balls_def {
     float color_std_max; /* tau_a, eq 23: largest mean channel std-dev of an even set, [0, 1]. Default 0.02 */
     int min_points;      /* N_min, eq 23: sets this small are not split; >= 1. Default 2 */
     int max_depth;       /* D_max, eq 23: [0, 64]; the root has depth 0. Default 18 */
-    float min_scale;     /* gamma, eq 21: s_min = max(gamma v, 1e-6). Default 0.25 */
+    float min_scale;     /* gamma, eq 21: s_min is at least max(gamma, 1e-6) v. Default 0.25 */
+    float min_radius;    /* and this, scene units, >= 0. Default 0; the paper: BALLS_PAPER_MIN_RADIUS */
 } balls_def;
 
-balls_def balls_def_default(void); /* the paper's settings; voxel_size is 0 and must be set */
+/** Of eq 21, in the data's own unit, so that balls and scales depend on what that is. */
+#define BALLS_PAPER_MIN_RADIUS 1e-6f
+
+/** The paper's settings, but for min_radius; voxel_size is 0 and must be set. */
+balls_def balls_def_default(void);
+
+/** s_min, eq 21: the least radius of a ball. */
+double balls_least_radius(const balls_def *def);
 
 /** One ball per element: members, centre mu, radius r (Yang 2026, eqs 17-21), covariance and colour. All
     owned by the struct. */

@@ -31,7 +31,7 @@ typedef struct growth_def {
     float grad_threshold;  /* tau >= 0, default 2e-4; level j uses tau * (hierarchy/2)^j */
     float importance_min;  /* anchors with less in the mean over the views that show them are pruned. Default
                               0.005, an opacity */
-    float interval;        /* I: views between rounds, default 100: a Gaussian counts when grad_count > I *
+    float interval;        /* I: views gathered for it, default 100: a Gaussian counts when grad_count > I *
                               GROWTH_SUCCESS * 0.5; an anchor is judged when visit_count > I * GROWTH_SUCCESS.
                               What was judged starts again from 0 */
     float shape_log_max;   /* scale_log[3..5] are cut to this in every round. Default infinity */

@@ -52,7 +52,7 @@ typedef struct gather_job {
     const frame *f;
     growth_importance importance;
     growth_counting counting;
-    float t_near;
+    float t_near, parts;
 } gather_job;
 
 /* The first Gaussian of the visible anchors from `row` on. */
@@ -78,7 +78,7 @@ static void gather_importance(const gather_job *job, size_t begin, size_t end, s
 {
     const frame *f = job->f;
     growth_stats *s = job->stats;
-    const float rays = (float)ray_image_count(&f->rays);
+    const float rays = (float)ray_image_count(&f->rays) * job->parts * job->parts; /* of the whole photo */
     for (size_t v = begin; v < end; v++) {
         s->visit_count[stat_row(s, f, v)] += 1;
         if (job->importance == GROWTH_BY_OPACITY) {
@@ -177,7 +177,9 @@ static void gather_gradients(const gather_job *job, const gradient_view *view, s
         to_camera(view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
-        s->grad_accum[at] += fminf(screen_gradient(view, p, d), gradient_max);
+        /* Of one of n x n parts the loss, a mean, has n^2 times the photo's gradient; the half width is 1/n
+           of the photo's. */
+        s->grad_accum[at] += fminf(screen_gradient(view, p, d) / job->parts, gradient_max);
         s->grad_count[at] += 1;
     }
 }
@@ -193,8 +195,8 @@ static void gather_block(size_t block, size_t begin, size_t end, void *context)
 }
 
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
-                         growth_counting counting, float t_near)
+                         growth_counting counting, float t_near, int parts)
 {
-    gather_job job = {s, f, importance, counting, t_near};
+    gather_job job = {s, f, importance, counting, t_near, (float)parts};
     parallel_blocks(f->visible_count, GATHER_BLOCK, gather_block, &job);
 }

@@ -27,10 +27,10 @@ enum {
 };
 enum { VIEWS_MIN = 2 };
 
-/* Is the next step one of those from `from` to the end of growth, and may geometry change? */
-static bool is_within(const trainer *t, double from)
+/* Is `step` one of those from `from` to the end of growth, and may geometry change? */
+static bool is_within(const trainer *t, uint64_t step, double from)
 {
-    const double progress = train_rules_progress(&t->rules, &t->pace, t->step);
+    const double progress = train_rules_progress(&t->rules, &t->pace, step);
     from = fmax(from, t->rules.geometry_from);
     if (!t->def.grow)
         return false;
@@ -39,16 +39,26 @@ static bool is_within(const trainer *t, double from)
     return progress > from + PROGRESS_ROUNDING && progress < t->def.grow_until - PROGRESS_ROUNDING;
 }
 
-bool growing_gathers(const trainer *t) { return is_within(t, SCHEDULE_STATS_FROM); }
+bool growing_gathers(const trainer *t) { return is_within(t, t->step, SCHEDULE_STATS_FROM); }
 
 bool growing_is_due(const trainer *t)
 {
-    if (!is_within(t, SCHEDULE_ADJUST_FROM))
+    if (!is_within(t, t->step, SCHEDULE_ADJUST_FROM))
         return false;
     if (!t->rules.rounds_by_progress)
         return (t->step + 1) % ROUND_INTERVAL == 0;
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1);
     return floor(progress * ROUNDS_PER_RUN) != floor(next * ROUNDS_PER_RUN);
+}
+
+float growing_interval(const trainer *t)
+{
+    if (!t->rules.rounds_by_progress)
+        return (float)t->def.views * ROUND_INTERVAL;
+    uint64_t steps = 0;
+    for (uint64_t step = t->round_step; step <= t->step; step++)
+        steps += is_within(t, step, SCHEDULE_STATS_FROM);
+    return fminf(fmaxf((float)t->def.views * (float)steps, (float)INTERVAL_MIN), (float)INTERVAL_MAX);
 }
 
 /* New rows come last, so the order of creation stays. */
@@ -133,12 +143,7 @@ static growth_def def_of(const trainer *t)
         def.may_stand = two_views_see;
         def.may_stand_context = t;
     }
-    const float views = (float)t->def.views;
-    if (!t->rules.rounds_by_progress)
-        def.interval = views * ROUND_INTERVAL;
-    else
-        def.interval = fminf(fmaxf(views * (float)(t->step + 1 - t->round_step), (float)INTERVAL_MIN),
-                             (float)INTERVAL_MAX);
+    def.interval = growing_interval(t);
     if (!t->rules.thresholds_by_length)
         return def;
     const float factor = (float)t->def.threshold_factor *

@@ -13,6 +13,10 @@ bool growing_gathers(const trainer *t);
     end of growth? */
 bool growing_is_due(const trainer *t);
 
+/** I of a round in the next step (growth_def.interval): views gathered since the last round, 20 at least and
+    100 at most. The reference has 100 steps', though more come before its first round. */
+float growing_interval(const trainer *t);
+
 /** Grow and prune: anchors, gradients and moments change together; new anchors have no momentum. GBT_OK,
     GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL (Embree). */
 gbt_status growing_round(trainer *t, gbt_error *err);

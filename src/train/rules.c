@@ -58,6 +58,7 @@ static train_rules reference_rules(void)
         .ball_scale_factor = 1,
         .spacing_scale_factor = 1,
         .near_depth = 0.2f,
+        .ball_radius_min = BALLS_PAPER_MIN_RADIUS,
         .widest = INFINITY,
         .voxel = GBT_VOXEL_RULE_SQUARED,
         .sight = FRAME_SIGHT_BY_ANCHOR,

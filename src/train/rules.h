@@ -28,6 +28,7 @@ typedef struct train_rules {
     bool finds_exposure;         /* exposure is learned where photos differ in it */
     bool adds_to_few_points;     /* by photo consistency, where the data set has few points */
     bool limits_first_scale;     /* an isolated point would start as a floater */
+    float ball_radius_min;       /* balls_def.min_radius: BALLS_PAPER_MIN_RADIUS, or 0 */
     double widest;               /* a Gaussian is at most so many times as wide as its anchor is far from the
                                     nearest training camera; infinite: no bound */
     bool features_from_colors;   /* first features carry the colour of the nearest point */

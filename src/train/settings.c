@@ -78,7 +78,7 @@ static const gbt_train_setting settings[] = {
     {NAMED("alpha", alpha), CHOICE(GBT_ALPHA_NAMES), .number = GBT_ALPHA_AUTO, .saved = true,
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
-             "white for Blender scenes, else black"},
+             "white for Blender scenes, else and with compat black"},
     {NAMED("background", background), CHOICE(GBT_BACKGROUND_NAMES), .number = GBT_BACKGROUND_CONSTANT,
      .saved = true, .if_changed = true, .help = "one colour, or learned colours by direction"},
     {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true,

@@ -104,6 +104,7 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.scale = t->def.scale_prior;
     def.balls.max_depth = t->def.max_depth;
     def.balls.voxel_size = t->voxel_size;
+    def.balls.min_radius = t->rules.ball_radius_min;
     def.offset_count = t->def.offsets;
     def.scale_factor = (float)t->def.scale_factor;
     /* Cameras that stand together say nothing of the size of what they see; and in the middle of it they are

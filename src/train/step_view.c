@@ -295,7 +295,8 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     if (alone)
         return GBT_OK;
     if (growing_gathers(t))
-        growth_stats_gather(&v->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near);
+        growth_stats_gather(&v->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near,
+                            r->parts);
     return step_rows_take(t, v, err);
 }
 

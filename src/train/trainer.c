@@ -180,7 +180,7 @@ static void gather_alone(trainer *t)
 {
     const step_view *v = &t->views[0];
     growth_stats_gather(&t->stats, &v->frame, t->rules.importance, t->rules.gradient_counting,
-                        step_view_near(t, v));
+                        step_view_near(t, v), v->outcome.parts);
 }
 
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)

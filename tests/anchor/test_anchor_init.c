@@ -50,8 +50,7 @@ static double expected_prior(const anchors *a, const balls *b, size_t i, const a
         near = radius;
     const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
     const double fused = (double)def->fusion * near + (1 - (double)def->fusion) * clipped;
-    return fmin(fmax(fused, fmax((double)(def->balls.min_scale * def->balls.voxel_size), 1e-6)),
-                (double)def->scale_max);
+    return fmin(fmax(fused, (double)(def->balls.min_scale * def->balls.voxel_size)), (double)def->scale_max);
 }
 
 static double expected_spacing(const anchors *a, size_t i)
@@ -323,6 +322,7 @@ static void tiny_scales_have_a_floor(void **state)
     (void)state;
     anchor_init_def def =
         def_with_voxel(1e-9f); /* everything below the floors: eps, and sqrt(1e-7) of the baseline */
+    def.balls.min_radius = BALLS_PAPER_MIN_RADIUS;
     anchors a;
     const float close[12] = {0, 0, 0, 1e-8f, 0, 0, 2e-8f, 0, 0, 3e-8f, 0, 0};
     for (int nn = 0; nn <= 1; nn++) {
@@ -334,6 +334,14 @@ static void tiny_scales_have_a_floor(void **state)
             assert_scale(&a, i, nn == 1 ? sqrt(1e-7) : 1e-6);
         anchors_free(&a);
     }
+    def.kind = GBT_INIT_GB; /* in our rules no unit of length is meant: eps is v / 4 */
+    def.scale = GBT_SCALE_PRIOR_GB;
+    def.balls.voxel_size = 1e-7f;
+    def.balls.min_radius = 0;
+    assert_ok(anchors_init(close, NULL, 4, &def, &a, NULL, NULL));
+    for (size_t i = 0; i < a.count; i++)
+        assert_scale(&a, i, 0.25e-7);
+    anchors_free(&a);
     float scale[4]; /* of points in one place, in any unit of length */
     assert_ok(
         anchor_scales_from_spacing((const float[12]){0}, 4, ANCHOR_SPACING_LEAST(1e-9f), 2, 1, scale, NULL));

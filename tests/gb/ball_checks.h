@@ -55,7 +55,8 @@ static inline void check_balls(const balls *b, const float *position, const floa
             cov[5] += d[2] * d[2] / n;
         }
         size = cov[0] + cov[3] + cov[5];
-        const double floor_radius = fmax((double)def->min_scale * (double)def->voxel_size, 1e-6);
+        const double floor_radius =
+            fmax(fmax((double)def->min_scale, 1e-6) * (double)def->voxel_size, (double)def->min_radius);
         const double radius = fmax(sqrt(size), floor_radius);
         if (!(fabs((double)b->radius[j] - radius) <= 1e-5 * radius))
             fail_msg("ball %zu of %g points: radius wanted %.9g, got %.9g", j, n, radius,

@@ -23,7 +23,7 @@ static adaptive_def def_of(float voxel_size, size_t most)
 static void check_adaptive(const balls *b, const float *position, const float *color, size_t count,
                            const adaptive_def *def)
 {
-    const balls_def like = {.voxel_size = def->voxel_size, .max_depth = 64, .min_scale = def->min_scale};
+    const balls_def like = {.voxel_size = def->voxel_size, .max_depth = 254, .min_scale = def->min_scale};
     check_balls(b, position, color, count, &like);
 }
 
@@ -298,6 +298,34 @@ static void outliers_neither_take_all_nor_stretch_balls(void **state)
     cloud_free(&c);
 }
 
+/* Lone points over 8.5 decades: each cut takes those within a small factor of the farthest. */
+static void outliers_over_many_decades_leave_no_surface_whole(void **state)
+{
+    (void)state;
+    enum { SURFACE = 4000, LONE = 3000, BALLS = 2048 };
+    cloud c = cloud_random(SURFACE + LONE, 9, 0, 1);
+    for (size_t i = 0; i < 3 * SURFACE; i++)
+        c.position[i] = i % 3 == 2 ? 0 : 2 * rng_uniform(9, 2, i) - 1;
+    for (size_t i = SURFACE; i < c.count; i++) {
+        float *at = c.position + 3 * i;
+        const double length = sqrt((double)(at[0] * at[0] + at[1] * at[1] + at[2] * at[2])),
+                     far = pow(10, 2 + 8.5 * (double)rng_uniform(9, 3, i));
+        for (int k = 0; k < 3; k++)
+            at[k] = (float)((double)at[k] * far / length);
+    }
+    const adaptive_def def = def_of(0.02f, BALLS);
+    balls b;
+    assert_ok(balls_adapt(c.position, NULL, c.count, &def, &b, &assert_ok_err_));
+    for (size_t j = 0; j < b.count; j++) {
+        size_t surface = 0;
+        for (uint32_t i = b.first[j]; i < b.first[j + 1]; i++)
+            surface += b.member[i] < SURFACE;
+        assert_in_range(surface, 0, 64);
+    }
+    balls_free(&b);
+    cloud_free(&c);
+}
+
 /* ---- degenerate clouds ---- */
 
 typedef struct shape {
@@ -357,22 +385,22 @@ static void one_place_is_one_ball_whatever_the_colours(void **state)
     cloud_free(&c);
 }
 
-/* Each point twice as far as the one before: every cut takes a point or two off, to the depth where cutting
-   ends. */
-static void skewed_clouds_end_at_depth_64(void **state)
+/* On each axis points that are four times as far as the one before: every cut takes one off, or a few, to the
+   depth where cutting ends. */
+static void skewed_clouds_end_at_depth_254(void **state)
 {
     (void)state;
-    enum { N = 253 };
+    enum { FAR = 126, N = 3 * FAR };
     float position[3 * N] = {0};
     for (int i = 0; i < N; i++)
-        position[3 * i] = ldexpf(1, i - N / 2);
+        position[3 * i + i % 3] = ldexpf(1, 2 * (i / 3) - FAR);
     const adaptive_def def = def_of(1e-3f, N);
     balls b;
     assert_ok(balls_adapt(position, NULL, N, &def, &b, &assert_ok_err_));
-    assert_in_range(b.count, 64, N - 1);
+    assert_in_range(b.count, 255, N - 1);
     size_t deepest = 0;
     for (size_t j = 0; j < b.count; j++)
-        if (b.depth[j] == 64 && b.first[j + 1] - b.first[j] > deepest)
+        if (b.depth[j] == 254 && b.first[j + 1] - b.first[j] > deepest)
             deepest = b.first[j + 1] - b.first[j];
     assert_true(deepest > 1);
     check_adaptive(&b, position, NULL, N, &def);
@@ -537,8 +565,9 @@ int main(void)
         cmocka_unit_test(colour_moves_the_cut),
         cmocka_unit_test(balls_go_where_colours_differ),
         cmocka_unit_test(outliers_neither_take_all_nor_stretch_balls),
+        cmocka_unit_test(outliers_over_many_decades_leave_no_surface_whole),
         cmocka_unit_test(one_place_is_one_ball_whatever_the_colours),
-        cmocka_unit_test(skewed_clouds_end_at_depth_64),
+        cmocka_unit_test(skewed_clouds_end_at_depth_254),
         cmocka_unit_test(input_order_does_not_matter),
         cmocka_unit_test(same_bits_for_any_thread_count),
         cmocka_unit_test(every_allocation_may_fail),

@@ -154,7 +154,7 @@ static tie_case tie_cases[] = {
 static void settles_a_tie(void **state)
 {
     const tie_case *c = *state;
-    const balls_def def = {1, 1e-3f, 0, c->min_points, 18, 0.25f};
+    const balls_def def = {1, 1e-3f, 0, c->min_points, 18, 0.25f, 0};
     for (int axis = 0; axis < 3; axis++) {
         float position[15] = {0}, color[15] = {0};
         for (size_t i = 0; i < c->count; i++) {
@@ -195,7 +195,7 @@ static void stops(void **state)
     const stop_case *c = *state;
     const float position[6] = {-c->half, 0, 0, c->half, 0, 0};
     const float color[6] = {c->shade[0], c->shade[0], c->shade[0], c->shade[1], c->shade[1], c->shade[1]};
-    const balls_def def = {c->voxel_size, c->radius_factor, c->color_std_max, 1, 18, c->min_scale};
+    const balls_def def = {c->voxel_size, c->radius_factor, c->color_std_max, 1, 18, c->min_scale, 0};
     balls b;
     assert_ok(balls_build(position, c->use_color ? color : NULL, 2, &def, &b, &assert_ok_err_));
     assert_int_equal(b.count, c->balls);
@@ -231,10 +231,38 @@ static void a_lone_point_has_the_floor_radius(void **state)
     assert_memory_equal(b.color, color, sizeof color);
     assert_true(b.radius[0] == 0.125f && b.color_std[0] == 0.0f && b.depth[0] == 0);
     balls_free(&b);
-    def.voxel_size = 1e-9f; /* the absolute floor of eq 21 */
+    def.voxel_size = 1e-9f;
+    assert_ok(balls_build(position, color, 1, &def, &b, &assert_ok_err_));
+    assert_true(b.radius[0] == 0.25e-9f);
+    balls_free(&b);
+    def.min_radius = BALLS_PAPER_MIN_RADIUS; /* the absolute floor of eq 21 */
     assert_ok(balls_build(position, color, 1, &def, &b, &assert_ok_err_));
     assert_true(b.radius[0] == 1e-6f);
     balls_free(&b);
+}
+
+/* In a unit a million times as long: the same balls. */
+static void the_unit_of_length_changes_nothing(void **state)
+{
+    (void)state;
+    enum { N = 3000 };
+    static const float unit = 0x1p-20f; /* no rounding */
+    cloud c = cloud_random(N, 14, 0, 1);
+    balls_def def = balls_def_default();
+    def.voxel_size = 0.1f;
+    balls of[2];
+    assert_ok(balls_build(c.position, c.color, N, &def, &of[0], &assert_ok_err_));
+    for (size_t i = 0; i < 3 * N; i++)
+        c.position[i] *= unit;
+    def.voxel_size *= unit;
+    assert_ok(balls_build(c.position, c.color, N, &def, &of[1], &assert_ok_err_));
+    assert_int_equal(of[0].count, of[1].count);
+    assert_memory_equal(of[0].member, of[1].member, N * sizeof *of[0].member);
+    for (size_t j = 0; j < of[0].count; j++)
+        assert_true(fabsf(of[1].radius[j] / (unit * of[0].radius[j]) - 1) < 1e-6f);
+    for (int i = 0; i < 2; i++)
+        balls_free(&of[i]);
+    cloud_free(&c);
 }
 
 static void identical_points_are_one_ball(void **state)
@@ -349,7 +377,7 @@ static void denormal_points_are_separated(void **state)
 {
     (void)state;
     float position[12] = {0, 0, 0, 1e-44f, 0, 0, 2e-44f, 0, 0, 3e-44f, 0, 0};
-    const balls_def def = {FLT_TRUE_MIN, 0.5f, 1, 1, 64, 0};
+    const balls_def def = {FLT_TRUE_MIN, 0.5f, 1, 1, 64, 0, BALLS_PAPER_MIN_RADIUS};
     balls b;
     /* The floor of 1e-6 on r is far above eta v, so eq 23 never calls such a set compact. */
     assert_ok(balls_build(position, NULL, 4, &def, &b, &assert_ok_err_));
@@ -451,21 +479,22 @@ typedef struct bad_case {
 
 #define GOOD_DEF                                                                                             \
     {                                                                                                        \
-        1, 1.25f, 0.02f, 2, 18, 0.25f                                                                        \
+        1, 1.25f, 0.02f, 2, 18, 0.25f, 0                                                                     \
     }
 static bad_case bad_cases[] = {
-    {"voxel_size not set", {0, 1.25f, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "voxel_size"},
-    {"voxel_size NaN", {NAN, 1.25f, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "voxel_size"},
-    {"voxel_size infinite", {INFINITY, 1.25f, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "voxel_size"},
-    {"radius_factor 0", {1, 0, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "radius_factor"},
-    {"radius_factor NaN", {1, NAN, 0.02f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "radius_factor"},
-    {"color_std_max above 1", {1, 1.25f, 1.5f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "color_std_max"},
-    {"color_std_max below 0", {1, 1.25f, -0.1f, 2, 18, 0.25f}, SIZE_MAX, 0, 0, "color_std_max"},
-    {"min_points 0", {1, 1.25f, 0.02f, 0, 18, 0.25f}, SIZE_MAX, 0, 0, "min_points"},
-    {"max_depth -1", {1, 1.25f, 0.02f, 2, -1, 0.25f}, SIZE_MAX, 0, 0, "max_depth"},
-    {"max_depth 65", {1, 1.25f, 0.02f, 2, 65, 0.25f}, SIZE_MAX, 0, 0, "max_depth"},
-    {"min_scale negative", {1, 1.25f, 0.02f, 2, 18, -1}, SIZE_MAX, 0, 0, "min_scale"},
-    {"a zeroed def", {0, 0, 0, 0, 0, 0}, SIZE_MAX, 0, 0, "voxel_size"},
+    {"voxel_size not set", {0, 1.25f, 0.02f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "voxel_size"},
+    {"voxel_size NaN", {NAN, 1.25f, 0.02f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "voxel_size"},
+    {"voxel_size infinite", {INFINITY, 1.25f, 0.02f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "voxel_size"},
+    {"radius_factor 0", {1, 0, 0.02f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "radius_factor"},
+    {"radius_factor NaN", {1, NAN, 0.02f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "radius_factor"},
+    {"color_std_max above 1", {1, 1.25f, 1.5f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "color_std_max"},
+    {"color_std_max below 0", {1, 1.25f, -0.1f, 2, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "color_std_max"},
+    {"min_points 0", {1, 1.25f, 0.02f, 0, 18, 0.25f, 0}, SIZE_MAX, 0, 0, "min_points"},
+    {"max_depth -1", {1, 1.25f, 0.02f, 2, -1, 0.25f, 0}, SIZE_MAX, 0, 0, "max_depth"},
+    {"max_depth 65", {1, 1.25f, 0.02f, 2, 65, 0.25f, 0}, SIZE_MAX, 0, 0, "max_depth"},
+    {"min_scale negative", {1, 1.25f, 0.02f, 2, 18, -1, 0}, SIZE_MAX, 0, 0, "min_scale"},
+    {"min_radius NaN", {1, 1.25f, 0.02f, 2, 18, 0.25f, NAN}, SIZE_MAX, 0, 0, "min_radius"},
+    {"a zeroed def", {0, 0, 0, 0, 0, 0, 0}, SIZE_MAX, 0, 0, "voxel_size"},
     {"NaN point", GOOD_DEF, 7, NAN, 0, "point 7 "},
     {"infinite point", GOOD_DEF, 9, -INFINITY, 0, "point 9 "},
     {"NaN colour", GOOD_DEF, 3, 0, NAN, "point 3 "},
@@ -493,8 +522,8 @@ static void limits_of_the_def_are_accepted(void **state)
 {
     (void)state;
     const float position[6] = {0, 0, 0, 1, 0, 0};
-    static const balls_def defs[] = {{FLT_TRUE_MIN, FLT_TRUE_MIN, 0, 1, 0, 0},
-                                     {FLT_MAX, FLT_MAX, 1, INT32_MAX, 64, FLT_MAX}};
+    static const balls_def defs[] = {{FLT_TRUE_MIN, FLT_TRUE_MIN, 0, 1, 0, 0, 0},
+                                     {FLT_MAX, FLT_MAX, 1, INT32_MAX, 64, FLT_MAX, FLT_MAX}};
     for (int i = 0; i < 2; i++) {
         balls b;
         assert_ok(balls_build(position, NULL, 2, &defs[i], &b, &assert_ok_err_));
@@ -551,6 +580,7 @@ int main(void)
         cmocka_unit_test(count_follows_the_closed_form),
         cmocka_unit_test(no_points_no_balls),
         cmocka_unit_test(a_lone_point_has_the_floor_radius),
+        cmocka_unit_test(the_unit_of_length_changes_nothing),
         cmocka_unit_test(identical_points_are_one_ball),
         cmocka_unit_test(denormal_points_are_separated),
         cmocka_unit_test(input_order_does_not_matter),

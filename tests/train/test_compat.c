@@ -62,6 +62,37 @@ static void statistics_are_of_steps_501_to_14999(void **state)
     assert_int_equal(steps.last, 14999);
 }
 
+/* I of the first two rounds: the views of the steps that gathered; of the reference 100 always. */
+static void rounds_count_what_was_gathered(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t steps;
+        bool compat, refine_poses;
+        float first;
+    } cases[] = {{1200, false, false, 52}, /* steps 20 to 71 */
+                 {2400, false, false, 100},
+                 {3000, false, true, 30},
+                 {WHOLE, true, false, 100}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        trainer t = {.def = def_of(cases[i].compat), .pace = pace_of_iterations(cases[i].steps)};
+        t.def.refine_poses = cases[i].refine_poses;
+        t.rules = train_rules_of(&t.def);
+        float gathered = 0;
+        for (int round = 0; round < 2; t.step++) {
+            gathered += growing_gathers(&t);
+            if (!growing_is_due(&t))
+                continue;
+            const float interval = growing_interval(&t);
+            assert_true(round > 0 || interval == cases[i].first);
+            assert_true(interval == (cases[i].compat ? 100 : fminf(fmaxf(gathered, 20), 100)));
+            t.round_step = t.step + 1;
+            gathered = 0;
+            round++;
+        }
+    }
+}
+
 /* Growth to a third of the run ends before step 10,000, though a third is no double. */
 static void growth_ends_before_its_last_step(void **state)
 {
@@ -167,6 +198,7 @@ static void the_other_rules_are_the_references(void **state)
     for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
         assert_true(t.anchors.feature[i] == 0);
     assert_int_equal(r->voxel, GBT_VOXEL_RULE_SQUARED);
+    assert_true(r->ball_radius_min == 1e-6f);
     assert_true(r->integer_division && r->coarse_level_gates && r->at_cell_center);
     assert_true(!r->own_adam_age && r->importance == GROWTH_BY_OPACITY && r->shape_log_max == 0.05f);
     assert_true(!r->thresholds_by_length && !r->grows_at_points && !r->needs_two_views);
@@ -258,11 +290,66 @@ static void voxels_are_where_the_world_puts_them(void **state)
     trainer_free(&t);
 }
 
+/* The tiny scene as one of Blender's: photos with an alpha channel, no points. */
+static void write_blender(const char *folder)
+{
+    scene s;
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(tiny, &split, &s, NULL));
+    char path[PATH_SIZE];
+    assert_ok(file_make_folder(folder, NULL));
+    snprintf(path, sizeof path, "%s/train", folder);
+    assert_ok(file_make_folder(path, NULL));
+    snprintf(path, sizeof path, "%s/transforms_train.json", folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    const gbt_camera *c = &s.views[0].camera;
+    fprintf(file, "{\"camera_angle_x\": %.17g, \"frames\": [", 2 * atan(0.5 * c->width / c->params[0]));
+    for (size_t i = 0; i < s.view_count; i++) {
+        image photo, with_alpha;
+        assert_ok(image_read(s.views[i].path, &photo, NULL));
+        assert_ok(image_alloc(&with_alpha, photo.width, photo.height, 4, NULL));
+        for (int p = 0; p < photo.width * photo.height; p++) {
+            memcpy(with_alpha.pixels + 4 * p, photo.pixels + photo.channels * p, 3 * sizeof(float));
+            with_alpha.pixels[4 * p + 3] = p > 0;
+        }
+        snprintf(path, sizeof path, "%s/train/%zu.png", folder, i);
+        assert_ok(image_write(path, &with_alpha, NULL));
+        image_free(&with_alpha);
+        image_free(&photo);
+        const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
+        fprintf(file, "%s{\"file_path\": \"./train/%zu\", \"transform_matrix\": [", i > 0 ? ", " : "", i);
+        for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
+            fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
+        fprintf(file, "[0, 0, 0, 1]]}");
+    }
+    fprintf(file, "]}\n");
+    assert_int_equal(fclose(file), 0);
+    scene_free(&s);
+}
+
+static void scenes_of_blender_lie_on_black(void **state)
+{
+    (void)state;
+    const char *folder = in_root("blender");
+    write_blender(folder);
+    for (int compat = 0; compat <= 1; compat++) {
+        const gbt_train_def def = def_of(compat == 1);
+        trainer t;
+        open_ok(&t, folder, &def);
+        assert_string_equal(t.scene.source, "blender");
+        for (int c = 0; c < 3; c++)
+            assert_true(t.settings.background[c] == (compat == 1 ? 0.0f : 1.0f));
+        trainer_free(&t);
+    }
+}
+
 int main(void)
 {
     static const struct CMUnitTest tests[] = {
         cmocka_unit_test(there_are_134_rounds),
         cmocka_unit_test(statistics_are_of_steps_501_to_14999),
+        cmocka_unit_test(rounds_count_what_was_gathered),
         cmocka_unit_test(growth_ends_before_its_last_step),
         cmocka_unit_test(rates_count_from_one),
         cmocka_unit_test(the_last_step_teaches_nothing),
@@ -272,6 +359,7 @@ int main(void)
         cmocka_unit_test(nothing_is_nearer_than_a_fifth),
         cmocka_unit_test(anchors_are_seen_by_themselves),
         cmocka_unit_test(voxels_are_where_the_world_puts_them),
+        cmocka_unit_test(scenes_of_blender_lie_on_black),
     };
     return cmocka_run_group_tests_name("compat", tests, make_root, remove_root);
 }

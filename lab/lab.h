@@ -21,7 +21,7 @@ typedef struct lab_bench_def {
     const char *json; /* where to write the figures; NULL: nowhere */
     float alpha_min;  /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply
                        */
-    float alpha_max;  /* alpha is cut here, in (0, 1); 0 or NaN: that of the run, 0.99 for a .ply */
+    float alpha_max;  /* alpha is cut here, in [alpha_min, 1); 0 or NaN: that of the run, 0.99 for a .ply */
     float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
                     a .ply */
     gbt_preset preset;  /* the three numbers above win over it. Default GBT_PRESET_AS_TRAINED */

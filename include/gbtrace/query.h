@@ -33,9 +33,10 @@ typedef struct gbt_balls gbt_balls;
  *
  * A run or its model file: a ball per anchor, around everything that its Gaussians can show in any view: the
  * farthest of their centres, and beyond it the largest std-dev as far as a response of 1/255 reaches. Plain
- * Gaussians: a ball per Gaussian, to where its response falls to 1/255, at least 0. A .ply of other vertices
- * (also of gbtrace init): its `radius`, or points. A data set: its sparse points. A text file: a line per
- * ball, "x y z" or "x y z radius", commas or blanks, # for comments.
+ * Gaussians: a ball per Gaussian, to where its response falls to 1/255, at least 0; those left out because a
+ * value is not usable are not counted. A .ply of other vertices (also of gbtrace init): its `radius`, or
+ * points. A data set: its sparse points. A text file: a line per ball, "x y z" or "x y z radius", commas or
+ * blanks, # for comments.
  *
  * @param path [in]  RUN, model.gbt, plain Gaussians in any format of gbt_export_format_at(), .ply, data set
  *                   folder, or .txt, .csv, .xyz

@@ -37,6 +37,10 @@ static gbt_status override_settings(const lab_bench_def *def, trace_settings *se
     GBT_TRY(loaded_run_preset(def->preset, settings, err));
     GBT_TRY(override_setting("alpha_min", def->alpha_min, &settings->alpha_min, err));
     GBT_TRY(override_setting("alpha_max", def->alpha_max, &settings->alpha_max, err));
+    if (settings->alpha_max < settings->alpha_min)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "bench: bad alpha_max (wanted alpha_min, %g, or more, got %g)",
+                         (double)settings->alpha_min, (double)settings->alpha_max);
     return override_setting("t_min", def->t_min, &settings->transmittance_min, err);
 }
 

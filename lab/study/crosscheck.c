@@ -192,10 +192,10 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
 
 /* ---- one view ---- */
 
-static void name_sheet(const char *of, const char *view, char out[CROSS_NAME_SIZE])
+static void name_sheet(const char *of, cross_view *v)
 {
-    snprintf(out, CROSS_NAME_SIZE, "crosscheck_%.120s_%.120s.png", of, view);
-    study_model_letters(out);
+    snprintf(v->sheet, sizeof v->sheet, "crosscheck_%.120s_%.120s.png", of, v->name);
+    study_model_letters(v->sheet);
 }
 
 /* With `pictures` and `traced` of the size of the camera. */
@@ -270,7 +270,7 @@ static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char 
     s->camera.shot = *shot;
     v->stand_in = make_pinhole(&s->camera.shot);
     snprintf(v->name, sizeof v->name, "%s", view);
-    name_sheet(out->name, view, v->sheet);
+    name_sheet(out->name, v);
     return measure_view(s, folder, v, err);
 }
 

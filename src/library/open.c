@@ -225,6 +225,9 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
         if (!(*ranges[k].values >= ranges[k].low && *ranges[k].values <= ranges[k].high))
             return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name,
                              (double)*ranges[k].values, (double)ranges[k].low, (double)ranges[k].high);
+    if (g->alpha_max < g->alpha_min)
+        return base_fail(err, GBT_ERR_ARGUMENT, "settings: alpha_max %g (wanted alpha_min, %g, or more)",
+                         (double)g->alpha_max, (double)g->alpha_min);
     trace_settings *s = &m->settings;
     if (memcmp(s->background, g->background, sizeof s->background) != 0)
         s->sky.varies = false;

@@ -108,22 +108,25 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 
 /* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
 static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *rows, const near_row *now,
-                                                              vmask16 hit, int j)
+                                                              vmask16 hit, int j, size_t *steps)
 {
     vfloat16 sum = vfloat16_set1(0);
+    const int from = j;
     do {
         const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now->t);
         sum = vfloat16_add_unless(behind, sum, row_load(rows->term, j));
         row_store(rows->behind, j, vfloat16_add_where(behind, row_load(rows->behind, j), now->term));
         j++;
     } while (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, j), now->t), hit)));
+    *steps += (size_t)(j - from);
     return vfloat16_add(row_load(rows->before, j), sum);
 }
 
 /* What lies behind every hit, with the background: from the last row to the first, as T was found from the
    first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
-   their nearest hits. Only sums of what has been added, so nothing cancels. */
-static void collect_behind(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
+   their nearest hits. Only sums of what has been added, so nothing cancels. False when it takes too many
+   steps: `term` and `behind` are then to be found ray by ray. */
+static bool collect_behind(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
                            vfloat16 background)
 {
     const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
@@ -133,6 +136,7 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
     const int count = (int)rows->count;
     near_row next = {infinite, zero, zero, zero}, second = next;
     vfloat16 after = background, nearest = infinite;
+    out->steps = 0;
     for (int i = count; i < count + 3; i++) {
         row_store(rows->before, i, background);
         row_store(rows->reached, i, infinite);
@@ -148,8 +152,11 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
         pass_on(&now, &next, &sum);
         pass_on(&now, &second, &sum);
         now.value = vfloat16_add(row_load(rows->before, i + 3), sum);
-        if (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, i + 3), now.t), hit)))
-            now.value = vfloat16_add(step_on(rows, &now, hit, i + 3), sum);
+        if (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, i + 3), now.t), hit))) {
+            now.value = vfloat16_add(step_on(rows, &now, hit, i + 3, &out->steps), sum);
+            if (out->steps > STEPS_PER_ROW * (size_t)(count - i) + STEPS_FREE)
+                return false;
+        }
         row_store(rows->behind, i + 2, second.value);
         second = next;
         next = now;
@@ -160,6 +167,7 @@ static void collect_behind(list_rows *out, const used_list *used, const vfloat16
     }
     row_store(rows->behind, 1, second.value);
     row_store(rows->behind, 0, next.value);
+    return true;
 }
 
 /* The same where all rays have one order. */
@@ -313,9 +321,8 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
     const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), rows->product);
     if (scene->settings.packet_order)
         collect_behind_in_order(rows, used, d_rgb, background);
-    else if (!rows->crowded)
-        collect_behind(rows, used, d_rgb, background);
-    else if (!collect_behind_by_ray(rows, used, d_rgb, background, scratch))
+    else if ((rows->crowded || !collect_behind(rows, used, d_rgb, background)) &&
+             !collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
     sum_rows(scene, used, rays, seen, d_rgb, rows, scratch->sums);
     return true;

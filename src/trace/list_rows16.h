@@ -15,7 +15,7 @@
 #include "trace/ray_hits.h"
 #include "trace/rows16.h"
 
-/* Steps back that a packet is allowed per row before its rays are sorted one by one. */
+/* Steps back, or on, that a packet is allowed per row before its rays are sorted one by one. */
 enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };
 
 /* Arrays of rows, PACKET_LANES floats each; sixteen more than `count` have memory. */
@@ -33,7 +33,7 @@ typedef struct list_rows {
     uint32_t *number; /* of a row, in the tile's list */
     float *key;       /* depth on a ray in the middle */
     size_t count;
-    size_t steps;
+    size_t steps;     /* of the last pass over them */
     vfloat16 product; /* of 1 - alpha over all rows */
     bool crowded;     /* too many steps: `through` is found by sorting */
 } list_rows;
@@ -171,16 +171,16 @@ static void order_cut_rows(const tile_list *list, list_rows *rows)
     order_by_index(list, rows, 0, cut);
 }
 
-/* Gaussians of one shape in one place are at one depth on all rays, however opaque each is: by index. */
+/* Gaussians in one place that are at one depth on one ray, as copies of other sizes and opacities are, may be
+   so on all: by index. */
 static void order_copies(const kernel_scene *scene, const tile_list *list, list_rows *rows)
 {
-    const size_t shape = RECORD_OPACITY * sizeof(float); /* what stands before it in a record */
     for (size_t first = 0, end; first < rows->count; first = end) {
         const float key = rows->key[rows->order[first]];
         for (end = first + 1; end < rows->count && rows->key[rows->order[end]] == key; end++) {
             const float *a = scene->records + (size_t)row_at(list, rows, first)->id * RECORD_FLOATS,
                         *b = scene->records + (size_t)row_at(list, rows, end)->id * RECORD_FLOATS;
-            if (memcmp(a, b, shape) != 0)
+            if (memcmp(a + RECORD_MEAN, b + RECORD_MEAN, 3 * sizeof *a) != 0)
                 break;
         }
         if (end - first > 1)
@@ -188,20 +188,37 @@ static void order_copies(const kernel_scene *scene, const tile_list *list, list_
     }
 }
 
+enum { MIDDLE = PACKET_PIXELS + 1 };
+
+/* The depth of a row for one order of all rays (trace_settings.packet_order). A plane seen from its edge may
+   be anywhere on a ray beside it, also behind its start: where the middle ray has no hit, the next one that
+   has says about how far it is. */
+static inline float packet_depth(const list_rows *rows, size_t i)
+{
+    const float *t = rows->t + i * PACKET_LANES;
+    const unsigned hit = vmask16_bits(vfloat16_lt(vfloat16_set1(0), row_load(rows->alpha, (int)i)));
+    const int ahead = __builtin_ctz((hit | hit << PACKET_LANES) >> MIDDLE);
+    const float near_by = t[(MIDDLE + ahead) % PACKET_LANES];
+    return larger(0.5f * near_by, smaller(t[MIDDLE], 2 * near_by)); /* NaN: twice */
+}
+
 /* The rows in the order of their depth on a ray in the middle; those of the same depth, in that of the tile's
-   list. Where two floats happen to be equal on one ray, this order decides: it knows more than they do. */
+   list. Where two floats happen to be equal on one ray, this order decides: it knows more than they do.
+   A depth may be negative where there is no hit; keys are not, so that rows that are cut come first. */
 static void order_by_middle(const kernel_scene *scene, const tile_list *list, list_rows *rows)
 {
-    enum { MIDDLE = PACKET_PIXELS + 1, FEW = 256 };
+    enum { FEW = 256 };
     const size_t count = rows->count;
     bool cut = false;
     for (size_t i = 0; i < count; i++) {
-        const float t = rows->t[i * PACKET_LANES + MIDDLE];
+        const float t =
+            scene->settings.packet_order ? packet_depth(rows, i) : fabsf(rows->t[i * PACKET_LANES + MIDDLE]);
         rows->key[i] = t < FLT_MAX ? t : FLT_MAX; /* NaN, too */
     }
     for (size_t i = 0; list->any_general && i < count; i++) {
-        const bool first =
-            vmask16_any(vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(scene->settings.t_near)));
+        const vmask16 hit = vfloat16_lt(vfloat16_set1(0), row_load(rows->alpha, (int)i)),
+                      near = vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(scene->settings.t_near));
+        const bool first = vmask16_any(vmask16_and(near, hit));
         if (first || rows->key[i] == FLT_MAX) /* no hit there */
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;

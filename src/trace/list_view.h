@@ -75,8 +75,9 @@ typedef struct view_outline {
     float kappa;                  /* t >= |(a, b, 1)| depth (1 - kappa) / w1 */
 } view_outline;
 
-/* In place of the outline of a Gaussian that the form does not hold for, because it reaches behind the near
-   depth or is as large as it is far: centre and covariance of its ellipsoid in the face's axes. */
+/* In place of the outline of a Gaussian that the form does not hold for, because it would, if it were
+   opaque, reach behind the near depth or be as large as it is far: centre and covariance of its ellipsoid in
+   the face's axes. */
 typedef struct view_ellipsoid {
     float center[3], uu, vv, ww, uw, vw;
 } view_ellipsoid;

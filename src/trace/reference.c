@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-enum { RAY_GRAIN = 32 };
+enum { RAY_GRAIN = 32, SIDE = 4, PACKET = SIDE * SIDE, MIDDLE = SIDE + 1 };
 
 typedef struct prepared {
     double mean[3], canon[9]; /* canon = S^-1 R^T, row-major: row i belongs to local axis i */
@@ -92,17 +92,49 @@ typedef struct hit_list {
 /* One ray and what it sees of. */
 typedef struct sight {
     double origin[3], dir[3], near, far;
-    double order_dir[3]; /* hits are sorted by their depth on this ray from the same origin */
-    bool own_order;      /* which is this one */
+    bool own_order; /* hits are sorted by their depth; else by packet_depth() of these, from one origin: */
+    const ray_image *rays;
+    size_t middle, packet[PACKET], packet_count; /* packet: from the middle one on, those that are rays */
 } sight;
 
-static double depth_on(const prepared *p, const trace_settings *s, const double origin[3],
-                       const double dir[3])
+static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
 {
-    reference_hit hit = {.t = HUGE_VAL};
-    double v[3];
-    respond(p, s, origin, dir, &hit, v);
-    return hit.t;
+    for (int k = 0; k < 3; k++) {
+        origin[k] = (double)ray_image_origin(rays, i)[k];
+        dir[k] = (double)rays->dir[3 * i + (size_t)k];
+    }
+}
+
+static double far_of(const ray_image *rays, size_t i)
+{
+    return rays->far == NULL ? HUGE_VAL : (double)rays->far[i];
+}
+
+static double near_of(const ray_image *rays, size_t i)
+{
+    return rays->near == NULL ? 0 : (double)rays->near[i];
+}
+
+/* Where a Gaussian that one of a packet's rays hits stands in the one order of all of them. */
+static double packet_depth(const prepared *p, const trace_settings *s, const sight *ray)
+{
+    double origin[3], dir[3], v[3], near_by = 0;
+    reference_hit middle = {.t = HUGE_VAL};
+    for (size_t k = 0; k < ray->packet_count; k++) {
+        const size_t at = ray->packet[k];
+        reference_hit hit;
+        ray_of(ray->rays, at, origin, dir);
+        if (!respond(p, s, origin, dir, &hit, v) || !(hit.t < far_of(ray->rays, at)) ||
+            hit.t < near_of(ray->rays, at))
+            continue;
+        if (hit.t <= (double)s->t_near)
+            return 0;
+        if (near_by == 0)
+            near_by = hit.t;
+    }
+    ray_of(ray->rays, ray->middle, origin, dir);
+    respond(p, s, origin, dir, &middle, v);
+    return fmax(0.5 * near_by, fmin(middle.t, 2 * near_by));
 }
 
 static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const sight *ray,
@@ -117,7 +149,7 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
         double v[3];
         if (!respond(&all[i], s, ray->origin, dir, &hit, v) || !(hit.t < ray->far) || hit.t < ray->near)
             continue;
-        hit.order = ray->own_order ? hit.t : depth_on(&all[i], s, ray->origin, ray->order_dir);
+        hit.order = ray->own_order ? hit.t : packet_depth(&all[i], s, ray);
         GBT_TRY(mem_reserve((void **)&list->hits, &list->capacity, list->count, list->count + 1, sizeof hit,
                             "reference hits", err));
         list->hits[list->count++] = hit;
@@ -161,43 +193,30 @@ static gbt_status prepare_all(const reference_scene *scene, const trace_settings
     return GBT_OK;
 }
 
-static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
-{
-    for (int k = 0; k < 3; k++) {
-        origin[k] = (double)ray_image_origin(rays, i)[k];
-        dir[k] = (double)rays->dir[3 * i + (size_t)k];
-    }
-}
-
-static double far_of(const ray_image *rays, size_t i)
-{
-    return rays->far == NULL ? HUGE_VAL : (double)rays->far[i];
-}
-
-static double near_of(const ray_image *rays, size_t i)
-{
-    return rays->near == NULL ? 0 : (double)rays->near[i];
-}
-
-/* Ray i; with packet_order, in the order of the ray in the second row and column of its 4 x 4 pixels, or,
-   where that is none, of the first of them that is one. */
+/* Ray i; with packet_order, those of its 4 x 4 pixels, too: the middle one is in their second row and column,
+   or, where that is none, the first of them that is one. */
 static void see(const trace_settings *s, const ray_image *rays, size_t i, sight *out)
 {
-    enum { SIDE = 4 };
     const size_t width = (size_t)rays->width, x0 = i % width / SIDE * SIDE, y0 = i / width / SIDE * SIDE;
     ray_of(rays, i, out->origin, out->dir);
     out->near = near_of(rays, i);
     out->far = far_of(rays, i);
     out->own_order = !s->packet_order;
-    for (int lane = -1; lane < SIDE * SIDE && s->packet_order; lane++) {
-        const size_t x = x0 + (size_t)(lane < 0 ? 1 : lane % SIDE),
-                     y = y0 + (size_t)(lane < 0 ? 1 : lane / SIDE);
-        double origin[3];
+    out->rays = rays;
+    out->packet_count = 0;
+    for (size_t k = 0, first = PACKET; k < PACKET && s->packet_order; k++) {
+        const size_t lane = (MIDDLE + k) % PACKET, x = x0 + lane % SIDE, y = y0 + lane / SIDE;
+        double origin[3], dir[3];
         if (x >= width || y >= (size_t)rays->height)
             continue;
-        ray_of(rays, y * width + x, origin, out->order_dir);
-        if (dvec_dot(out->order_dir, out->order_dir) > 0)
-            break;
+        ray_of(rays, y * width + x, origin, dir);
+        if (!(dvec_dot(dir, dir) > 0))
+            continue;
+        out->packet[out->packet_count++] = y * width + x;
+        if (k == 0 || lane < first) {
+            out->middle = y * width + x;
+            first = k == 0 ? 0 : lane;
+        }
     }
 }
 

@@ -20,7 +20,7 @@
 
 typedef struct reference_hit {
     double t, alpha, d2; /* t = t_c, in lengths of the direction */
-    double order;        /* what hits are sorted by: t, or with packet_order the t of the packet's ray */
+    double order;        /* what hits are sorted by: t, or with packet_order its depth for the packet */
     uint32_t id;
 } reference_hit;
 

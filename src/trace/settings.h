@@ -19,10 +19,11 @@ typedef struct trace_settings {
     float t_near;        /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
     float background[3]; /* blended last, with the remaining T. Default 0 */
     sky sky;             /* what is added to it by the ray's direction. Default nothing */
-    bool packet_order;   /* blend the hits of 4 x 4 neighbouring rays in one order, that of their depths on a
-                            ray in the middle (those that are cut at t_near on one of them first), and not
-                            each ray's own in its own order. An approximation for training, docs/tracing.md;
-                            only rays that go over lists heed it. Default false */
+    bool packet_order;   /* blend the hits of 4 x 4 neighbouring rays in one order, and not each ray's own in
+                            its own order: first the Gaussians that one of them hits at t_near, by index; then
+                            by their depth on a ray in the middle, which counts as at least half and at most
+                            twice that on the next ray that is hit. An approximation for training,
+                            docs/tracing.md; only rays that go over lists heed it. Default false */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

@@ -20,7 +20,9 @@
 #include "trace/settings.h"
 #include "trace/view_lists.h"
 
-/** Which way rays go. All give the same picture to float rounding; the adjoint is the same for all. */
+/** Which way rays go. All give the same picture to float rounding, but of copies of one Gaussian that differ
+    in opacity TRACE_TILE may put the more opaque one first, whatever its index; the adjoint is the same for
+    all. */
 typedef enum trace_kernel {
     TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
                      point; other rays as TRACE_TILE */

@@ -72,6 +72,15 @@ static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opaci
     return vfloat16_fma(vfloat16_load(cut), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
 }
 
+/* The same of opacity 1, or of their own if that is more. */
+static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
+{
+    const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius,
+                whole = smaller(2 * logf(1 / scene->settings.alpha_min), radius2);
+    return vfloat16_max(cut,
+                        vfloat16_fma(vfloat16_set1(whole), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f)));
+}
+
 typedef struct outline_lanes {
     vfloat16 field[8]; /* of view_outline */
     vmask16 holds;     /* the form holds; the others need their ellipsoids */
@@ -231,7 +240,10 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
         view_form_find(frame->axis, &lanes, slope[0], slope[1], depth, &form);
         const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
         const outline_lanes outline = find_outlines(scene, &form, depth, cut);
-        const unsigned holds = vmask16_bits(outline.holds) & visible;
+        /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ
+           in rounding, and so would their order from ray to ray. */
+        const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
+        const unsigned holds = vmask16_bits(whole) & visible;
         vmask16 inside = vmask16_from_bits(holds);
         for (int k = 0; k < 2; k++) {
             const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];

@@ -355,8 +355,8 @@ static void settings_are_checked(void **state)
     gbt_model *model = made();
     const gbt_model_settings fine = gbt_model_get_settings(model);
     assert_true(fine.footprint == 0.1f && fine.alpha_max == 0.99f && fine.background[1] == 0);
-    gbt_model_settings rows[8];
-    for (int i = 0; i < 8; i++)
+    gbt_model_settings rows[9];
+    for (int i = 0; i < 9; i++)
         rows[i] = fine;
     rows[0].background[2] = NAN;
     rows[1].footprint = 5;
@@ -366,7 +366,8 @@ static void settings_are_checked(void **state)
     rows[5].transmittance_min = NAN;
     rows[6].footprint = NAN;
     rows[7].t_near = INFINITY;
-    for (int i = 0; i < 8; i++) {
+    rows[8].alpha_max = 0.99f * fine.alpha_min;
+    for (int i = 0; i < 9; i++) {
         gbt_error err = {0};
         assert_refused(gbt_model_set_settings(model, &rows[i], &err), &err, GBT_ERR_ARGUMENT, "settings:");
         const gbt_model_settings now = gbt_model_get_settings(model);

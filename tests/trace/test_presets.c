@@ -10,7 +10,6 @@
 #include "trace/trace.h"
 
 static const double half_step = 0.5 / 255;
-static const char *const names[] = {"exact", "default", "fast"}; /* in the order of gbt_preset */
 
 static trace_settings preset(gbt_preset which)
 {
@@ -71,18 +70,18 @@ static void find_hits(const reference_scene *scene, const trace_settings *s, con
 
 /* What the bound of one ray is made of. */
 typedef struct ray_bound {
-    double dropped;      /* W: weight that hits below alpha_min have in the whole picture */
+    double dropped; /* W: weight that hits below alpha_min or beyond the radius have in the whole picture */
     double dropped_odds; /* 1 - prod (1 - alpha) over them */
     size_t dropped_count;
 } ray_bound;
 
-static ray_bound bound_ray(const ray_hits *list, double alpha_min)
+static ray_bound bound_ray(const ray_hits *list, double alpha_min, double d2_max)
 {
     ray_bound b = {0};
     double T = 1, open = 1;
     for (size_t i = 0; i < list->count; i++) {
         const double alpha = list->hits[i].alpha;
-        if (alpha < alpha_min) {
+        if (alpha < alpha_min || list->hits[i].d2 > d2_max) {
             b.dropped += T * alpha;
             open *= 1 - alpha;
             b.dropped_count++;
@@ -98,14 +97,30 @@ typedef struct preset_figures {
         of_bound; /* worst error of the tracer, worst bound, worst error as a part of its ray's bound */
 } preset_figures;
 
-static preset_figures check_preset(const gaussians *g, const ray_image *rays, gbt_preset which,
+/* Cut-offs, and between what the worst error must be. */
+typedef struct cut_row {
+    const char *name;
+    gbt_preset preset;
+    float radius;
+    float alpha_max; /* 0: the model's, with and without cut-offs */
+    double error_low, error_high;
+} cut_row;
+
+static preset_figures check_preset(const gaussians *g, const ray_image *rays, const cut_row *row,
                                    const float background[3])
 {
-    trace_settings s = preset(which), all = whole();
+    trace_settings s = preset(row->preset), all = whole(), uncut = all; /* uncut: but for alpha_max */
+    s.proxy_radius = row->radius;
+    if (row->alpha_max > 0) {
+        s.alpha_max = uncut.alpha_max = row->alpha_max;
+        all.alpha_max = 0.9999999f;
+    }
     memcpy(s.background, background, sizeof s.background);
     memcpy(all.background, background, sizeof all.background);
     const size_t count = ray_image_count(rays);
-    const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max);
+    const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max),
+                 cap = row->alpha_max > 0 ? 1 - (double)s.alpha_max : 0,
+                 square = (double)s.proxy_radius * (double)s.proxy_radius;
     double *want = mem_alloc(count, 3 * sizeof *want, "test", NULL),
            *cut = mem_alloc(count, 3 * sizeof *cut, "test", NULL), color_max = 1;
     for (size_t i = 0; i < g->count; i++)
@@ -122,14 +137,14 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, gb
     assert_ok(reference_scene_forward(&scene, &all, rays, want, NULL, NULL, NULL));
     assert_ok(reference_scene_forward(&scene, &s, rays, cut, NULL, NULL, NULL));
     for (size_t i = 0; i < count; i++) {
-        find_hits(&scene, &all, rays, i, &list);
-        const ray_bound b = bound_ray(&list, (double)s.alpha_min),
-                        wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4));
-        const double m = (double)b.dropped_count, a = (double)s.alpha_min;
+        find_hits(&scene, &uncut, rays, i, &list);
+        const ray_bound b = bound_ray(&list, (double)s.alpha_min, square),
+                        wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4), square * (1 - 1e-4));
+        const double m = (double)b.dropped_count, a = fmax((double)s.alpha_min, exp(-0.5 * square));
         assert_true(b.dropped <= b.dropped_odds + 1e-12);
         assert_true(b.dropped_odds <= 1 - pow(1 - a, m) + 1e-12 && 1 - pow(1 - a, m) <= m * a + 1e-12);
-        const double bound = color_max * (b.dropped + stop),
-                     float_bound = color_max * (wider.dropped + stop * (1 + 1e-4)) + 3e-5;
+        const double bound = color_max * (b.dropped + stop + cap),
+                     float_bound = color_max * (wider.dropped + stop * (1 + 1e-4) + cap) + 3e-5;
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
             assert_near(cut[k], want[k], bound + 1e-9);
             assert_near((double)rgb.pixels[k], want[k], float_bound);
@@ -150,12 +165,18 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, gb
 static void check_scene(const char *scene, const gaussians *g, const ray_image *rays)
 {
     const float background[3] = {0, 0.5f, 1};
-    for (size_t i = 0; i < 3; i++) {
-        const preset_figures f = check_preset(g, rays, (gbt_preset)i, background);
-        print_message("%-14s %-8s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene,
-                      names[i], f.error, f.bound, 100 * f.of_bound);
-        assert_true(i > 0 || f.error < 0.5 * half_step); /* exact: half of half an 8-bit step */
-        assert_true(i == 0 || f.error > half_step);      /* and the others do leave something out */
+    const cut_row rows[] = {{"exact", GBT_PRESET_EXACT, INFINITY, 0, 0, 0.5 * half_step},
+                            {"default", GBT_PRESET_DEFAULT, INFINITY, 0, half_step, INFINITY},
+                            {"fast", GBT_PRESET_FAST, INFINITY, 0, half_step, INFINITY},
+                            {"radius 3", GBT_PRESET_EXACT, 3, 0, 0, INFINITY},
+                            {"radius 2.5", GBT_PRESET_EXACT, 2.5f, 0, 0, INFINITY},
+                            {"radius 2", GBT_PRESET_EXACT, 2, 0, half_step, INFINITY},
+                            {"alpha_max", GBT_PRESET_EXACT, INFINITY, 0.9f, 0, INFINITY}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const preset_figures f = check_preset(g, rays, &rows[i], background);
+        print_message("%-14s %-10s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene,
+                      rows[i].name, f.error, f.bound, 100 * f.of_bound);
+        assert_true(f.error >= rows[i].error_low && f.error < rows[i].error_high);
     }
 }
 

@@ -280,15 +280,25 @@ static void print_figures(const char *name, const figures *f)
     print_message("\n");
 }
 
-static void assert_figures(const char *name, const figures *f, double gradient_limit)
+/* What float rounding may leave. Of the scenes in docs/tracing.md, over lists: three times what it does. */
+typedef struct limits {
+    double psnr, error, gradient;
+} limits;
+
+static void assert_limits(const char *name, const figures *f, const limits *most)
 {
     print_figures(name, f);
-    if (!(f->psnr >= 100 && f->max_error <= 2e-5 && f->T_error <= 2e-5))
+    if (!(f->psnr >= most->psnr && f->max_error <= most->error && f->T_error <= 2e-5))
         fail_msg("%s: %.1f dB, max error %.3g, of T %.3g", name, f->psnr, f->max_error, f->T_error);
     for (int class = 0; class < CLASS_COUNT; class ++)
-        if (!(f->gradient[class] <= gradient_limit))
+        if (!(f->gradient[class] <= most->gradient))
             fail_msg("%s: gradient of %s is off by %.3g", name, class_names[class], f->gradient[class]);
     assert_true(f->band * 5 <= f->rays);
+}
+
+static void assert_figures(const char *name, const figures *f, double gradient_limit)
+{
+    assert_limits(name, f, &(limits){100, 2e-5, gradient_limit});
 }
 
 static trace_settings with_background(void)
@@ -321,6 +331,11 @@ static void random_scenes(void **state)
         {"tiny", 300, 1e-3f, 1e-4f, 3e-4f, 1, 0.9f, {2e-3, 1e-3, -4e-3}},
         {"huge", 300, 1e6f, 1e5f, 3e5f, 1, 0.9f, {2e6, 1e6, -4e6}},
     };
+    static const limits ordinary = {129, 1.8e-6, 2.4e-6}, flat = {130, 2e-5, 3e-5},
+                        needles = {131, 2e-5, 5e-4}, all_sizes = {126, 2e-5, 1e-5}, far = {100, 2e-5, 1e-5};
+    static const limits *const over_lists[] = {&ordinary,  &ordinary, &ordinary, &ordinary,
+                                               &ordinary,  &ordinary, &flat,     &needles,
+                                               &all_sizes, &far,      &far};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         gaussians g = make_cloud(&rows[i], 100 + i);
         trace_settings s = with_background();
@@ -333,11 +348,35 @@ static void random_scenes(void **state)
         /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone
            moves every hit by that much more of a std-dev. */
         const float thin = rows[i].flatness;
-        assert_figures(rows[i].name, &f, thin > 500 ? 5e-4 : thin > 50 ? 5e-5 : 1e-5);
+        if (kernel == TRACE_LIST)
+            assert_limits(rows[i].name, &f, over_lists[i]);
+        else
+            assert_figures(rows[i].name, &f, thin > 500 ? 5e-4 : thin > 50 ? 5e-5 : 1e-5);
         assert_true(f.hits > 0);
         ray_image_free(&rays);
         gaussians_free(&g);
     }
+}
+
+/* Of trace_settings.packet_order to each ray's own order: the largest difference of two pixels. */
+static double off_by_one_order(const gaussians *g, const trace_settings *settings, const ray_image *rays)
+{
+    image rgb[2] = {{0}, {0}};
+    trace_scene scene = {0};
+    trace_settings s = *settings;
+    double largest = 0;
+    for (int k = 0; k < 2; k++) {
+        s.packet_order = k == 1;
+        assert_ok(image_fit(&rgb[k], rays->width, rays->height, 3, NULL));
+        assert_ok(trace_build(&scene, g, &s, 0, NULL));
+        assert_ok(trace_forward(&scene, rays, false, &(trace_outputs){.rgb = &rgb[k]}, NULL, NULL));
+    }
+    for (size_t k = 0; k < 3 * ray_image_count(rays); k++)
+        largest = fmax(largest, fabs((double)rgb[0].pixels[k] - (double)rgb[1].pixels[k]));
+    trace_scene_free(&scene);
+    image_free(&rgb[0]);
+    image_free(&rgb[1]);
+    return largest;
 }
 
 /* trace_settings.packet_order. Few enough Gaussians that no two are equally deep on a ray in the middle and
@@ -356,26 +395,57 @@ static void one_order_for_sixteen_rays(void **state)
         trace_settings s = with_background();
         const gbt_camera camera = camera_at(rows[i].camera, (double[3]){0, 0, 0}, 37, 21, 40);
         ray_image rays = {0};
-        image exact = {0}, in_one_order = {0};
-        trace_scene scene = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        image *const out[] = {&exact, &in_one_order};
-        for (int k = 0; k < 2; k++) {
-            s.packet_order = k == 1;
-            assert_ok(image_fit(out[k], rays.width, rays.height, 3, NULL));
-            assert_ok(trace_build(&scene, &g, &s, 0, NULL));
-            assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = out[k]}, NULL, NULL));
-        }
+        s.packet_order = true;
         const figures f = compare(&g, &s, &rays, i, 1e-6);
         assert_figures(rows[i].name, &f, rows[i].flatness > 50 ? 5e-5 : 1e-5);
-        /* It is an approximation. */
-        double largest = 0;
-        for (size_t k = 0; k < 3 * ray_image_count(&rays); k++)
-            largest = fmax(largest, fabs((double)exact.pixels[k] - (double)in_one_order.pixels[k]));
-        assert_true(largest > 1e-3);
-        trace_scene_free(&scene);
-        image_free(&exact);
-        image_free(&in_one_order);
+        assert_true(off_by_one_order(&g, &s, &rays) > 1e-3); /* an approximation */
+        ray_image_free(&rays);
+        gaussians_free(&g);
+    }
+}
+
+/* A plane behind everything that the lowest rays alone hit: on the middle rays of their packets it is behind
+   the camera, or cut at the near depth. One order of few rows and of many is that of each ray. */
+static void one_order_beside_a_plane(void **state)
+{
+    (void)state;
+    if (kernel != TRACE_LIST)
+        return;
+    static const float planes[2][3] = {{-1, 200, 40}, {-0.2f, 5, 20}}; /* y, z; size */
+    for (size_t k = 0; k < 4; k++) {
+        const float *plane = planes[k % 2];
+        const size_t count = k < 2 ? 200 : 300;
+        gaussians g = some(count + 1, 0.006f);
+        for (size_t i = 0; i < count; i++) {
+            g.mean_z[i] = 3 + 0.01f * (float)i;
+            g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1.5f;
+            g.red[i] = g.blue[i] = 0;
+        }
+        g.mean_y[count] = plane[0];
+        g.mean_z[count] = plane[1];
+        g.scale_x[count] = g.scale_z[count] = plane[2];
+        g.scale_y[count] = 0.01f;
+        g.opacity[count] = 0.9f;
+        g.green[count] = g.blue[count] = 0;
+        trace_settings s = with_background();
+        s.packet_order = true;
+        const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0.275, 5}, 16, 16, 7.322);
+        ray_image rays = {0};
+        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+        image d_rgb = random_gradient(&rays, 1);
+        traced t = trace_all(&g, &s, &rays, &d_rgb);
+        assert_true(t.weight[count] > 0.1f); /* it is seen */
+        const double off = off_by_one_order(&g, &s, &rays);
+        double *rgb = mem_alloc(3 * ray_image_count(&rays), sizeof *rgb, "test", NULL);
+        assert_ok(reference_forward(&g, &s, &rays, rgb, NULL, NULL, NULL));
+        print_message("beside a plane: one order is off by %.1e\n", off);
+        assert_true(off < 2e-5);
+        for (size_t i = 0; i < 3 * ray_image_count(&rays); i++)
+            assert_near((double)t.rgb.pixels[i], rgb[i], 5e-5);
+        mem_free(rgb);
+        traced_free(&t);
+        image_free(&d_rgb);
         ray_image_free(&rays);
         gaussians_free(&g);
     }
@@ -392,7 +462,8 @@ static int compare_doubles(const void *a, const void *b)
 static void needles_one_by_one(void **state)
 {
     (void)state;
-    static const double ratios[] = {1, 1e2, 1e3, 1e4, 1e6};
+    static const double ratios[] = {1, 1e2, 1e3, 1e4, 1e6},
+                        over_lists[] = {1.0 / 255, 1.3e-5, 1.1e-4, 1.1e-3};
     enum { NEEDLES = 200 };
     const trace_settings s = trace_settings_default();
     for (size_t k = 0; k < sizeof ratios / sizeof ratios[0]; k++) {
@@ -454,7 +525,7 @@ static void needles_one_by_one(void **state)
                       error[NEEDLES * 95 / 100], error[NEEDLES - 1]);
         if (ratios[k] <= 1e4) {
             assert_int_equal(seen, NEEDLES);
-            assert_true(error[NEEDLES * 95 / 100] <= 1.0 / 255);
+            assert_true(error[NEEDLES * 95 / 100] <= (kernel == TRACE_LIST ? over_lists[k] : 1.0 / 255));
         }
     }
 }
@@ -485,7 +556,8 @@ static void faces_of_a_cube(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, 130 + i, 1e-6);
-        assert_figures(rows[i].name, &f, 1e-5);
+        assert_limits(rows[i].name, &f,
+                      kernel == TRACE_LIST ? &(limits){132, 2e-5, 2.2e-6} : &(limits){100, 2e-5, 1e-5});
         trace_scene scene = {.kernel = TRACE_LIST};
         image rgb;
         assert_ok(image_alloc(&rgb, rays.width, rays.height, 3, NULL));
@@ -536,7 +608,7 @@ static void rays_that_do_not_run_together(void **state)
     }
     const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
     const figures f = compare(&g, &s, &rays, 42, 1e-6);
-    assert_figures("every way", &f, 1e-5);
+    assert_limits("every way", &f, &(limits){135, 2e-5, 8e-7});
     assert_true(f.counters.spilled_packets >= 16); /* of 20; those in the corners have few rays */
     gaussians_free(&g);
 }
@@ -612,12 +684,27 @@ static void coincident_gaussians(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         const figures f = compare(&g, &s, &rays, 50, 1e-6);
-        assert_figures(count == 150 ? "150 at once" : "800 at once", &f,
-                       count == 150 ? 1e-5 : 5e-5); /* T is a product of 800 roundings */
+        const limits few = {113, 2e-5, 6e-6}, many = {109, 2e-5, 5e-5}; /* T: a product of 800 roundings */
+        if (kernel == TRACE_LIST)
+            assert_limits(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? &few : &many);
+        else
+            assert_figures(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? 1e-5 : 5e-5);
         assert_int_equal(f.counters.spilled_packets, kernel == TRACE_TILE && count == 800 ? 12 : 0);
         ray_image_free(&rays);
         gaussians_free(&g);
     }
+}
+
+static void assert_copies(const char *name, const gaussians *g, const double center[3],
+                          const double target[3], int size, double fov)
+{
+    const trace_settings s = with_background();
+    const gbt_camera camera = camera_at(center, target, size, size, fov);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const figures f = compare(g, &s, &rays, 60, 1e-6);
+    assert_figures(name, &f, 2e-5);
+    ray_image_free(&rays);
 }
 
 /* Gaussians of one shape in one place go by index however opaque each is, though those that are less so end
@@ -628,7 +715,6 @@ static void copies_of_other_opacity(void **state)
     (void)state;
     if (kernel == TRACE_TILE)
         skip();
-    const trace_settings s = with_background();
     for (size_t count = 3; count <= 300; count *= 10) {
         const float most = count < 300 ? 0.5f : 0.03f;
         gaussians g = some(count, 0);
@@ -637,14 +723,33 @@ static void copies_of_other_opacity(void **state)
             g.red[i] = rng_uniform(8, 0, i), g.green[i] = i % 2 == 0, g.blue[i] = (float)i / (float)count;
             g.scale_x[i] = 0.3f, g.scale_y[i] = 0.2f, g.scale_z[i] = 0.4f;
         }
-        const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 40, 36, 30);
-        ray_image rays = {0};
-        assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        const figures f = compare(&g, &s, &rays, 60, 1e-6);
-        assert_figures("copies", &f, 2e-5);
-        ray_image_free(&rays);
+        assert_copies("copies", &g, (double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 40, 30);
         gaussians_free(&g);
     }
+    /* As near as it depends on what is seen of them which formula they get. */
+    for (int k = 0; k < 5; k++) {
+        gaussians g = some(2, 0.3f);
+        for (size_t i = 0; i < 2; i++) {
+            g.mean_x[i] = 0.3f, g.mean_y[i] = 0.2f, g.mean_z[i] = 4 + 0.2f * (float)k;
+            g.scale_y[i] = 1.05f, g.scale_z[i] = 0.97f;
+            g.quat_w[i] = 0.92338f, g.quat_x[i] = 0.10260f, g.quat_y[i] = 0.30779f, g.quat_z[i] = 0.20520f;
+            g.red[i] = i == 1, g.green[i] = 0, g.blue[i] = i == 0;
+        }
+        g.opacity[1] = 0.9f;
+        assert_copies("copies nearby", &g, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, 64, 40);
+        gaussians_free(&g);
+    }
+    /* Of another size, too: at the same depths. */
+    gaussians g = some(3, 0.4f);
+    for (size_t i = 0; i < 3; i++) {
+        g.mean_x[i] = 1, g.mean_y[i] = 0.5f, g.mean_z[i] = 5;
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = i == 2 ? 1 : 0.5f;
+        g.red[i] = i == 1, g.green[i] = 0, g.blue[i] = i == 0;
+    }
+    g.opacity[1] = 0.9f;
+    g.opacity[2] = 0.014f;
+    assert_copies("two sizes", &g, (double[3]){0, 0, 0}, (double[3]){0, 0, 1}, 64, 40);
+    gaussians_free(&g);
 }
 
 /* The camera inside of many that hide each other, and no near depth: most hits are at depth 0, where they go
@@ -764,6 +869,50 @@ static void assert_same(const traced *a, const traced *b, size_t rays, size_t co
     for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
         assert_memory_equal(x[f], y[f], count * sizeof(float));
     assert_memory_equal(&a->counters, &b->counters, sizeof a->counters);
+}
+
+/* A row that comes last on the middle rays, and on few others first: the adjoint goes past it once for each
+   row in front, and then sorts the rays one by one. */
+static void the_last_row_is_near_on_few_rays(void **state)
+{
+    (void)state;
+    if (kernel != TRACE_LIST)
+        return;
+    enum { COUNT = 800 };
+    gaussians g = some(COUNT + 1, 0.0003f);
+    for (size_t i = 0; i < COUNT; i++) {
+        g.mean_z[i] = 8.5f + 2 * (float)i / COUNT;
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 1.5f;
+        g.red[i] = rng_uniform(62, 0, i);
+        g.blue[i] = rng_uniform(62, 1, i);
+    }
+    g.mean_y[COUNT] = -0.16f;
+    g.mean_z[COUNT] = 12;
+    g.scale_x[COUNT] = g.scale_z[COUNT] = 1.6f;
+    g.scale_y[COUNT] = 0.004f;
+    g.opacity[COUNT] = 0.9f;
+    trace_settings s = with_background();
+    s.alpha_min = 1e-4f;
+    const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0.1933, 5}, 16, 16, 7.322);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const figures f = compare(&g, &s, &rays, 62, 1e-6);
+    assert_figures("late and near", &f, 5e-4);
+    assert_int_equal(f.counters.spilled_packets, 0); /* forward */
+    image d_rgb = random_gradient(&rays, 63);
+    cpu_limit_isa(CPU_PLAIN);
+    traced first = trace_all(&g, &s, &rays, &d_rgb);
+    for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++) {
+        cpu_limit_isa(isa);
+        traced again = trace_all(&g, &s, &rays, &d_rgb);
+        assert_same(&first, &again, ray_image_count(&rays), g.count);
+        traced_free(&again);
+    }
+    cpu_limit_isa(CPU_AVX512);
+    traced_free(&first);
+    image_free(&d_rgb);
+    ray_image_free(&rays);
+    gaussians_free(&g);
 }
 
 static void instruction_sets_and_threads_give_the_same_bits(void **state)
@@ -1068,6 +1217,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_scenes),
         cmocka_unit_test(one_order_for_sixteen_rays),
+        cmocka_unit_test(one_order_beside_a_plane),
         cmocka_unit_test(needles_one_by_one),
         cmocka_unit_test(faces_of_a_cube),
         cmocka_unit_test(rays_that_do_not_run_together),
@@ -1077,6 +1227,7 @@ int main(void)
         cmocka_unit_test(inside_of_many),
         cmocka_unit_test(sheets_that_end_behind_a_wall),
         cmocka_unit_test(the_cap_is_exact),
+        cmocka_unit_test(the_last_row_is_near_on_few_rays),
         cmocka_unit_test(instruction_sets_and_threads_give_the_same_bits),
         cmocka_unit_test(rays_that_are_none),
         cmocka_unit_test(broken_gaussians_are_left_out),

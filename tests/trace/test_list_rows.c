@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tests/trace/test_list_rows.c -- the steps that the adjoint over lists takes are bounded, and it gives the
+   same with too many of them. */
+#include "base/near.h"
+#include "test_support.h"
+
+#define SIMD16_PLAIN
+#define KERNEL_NAME list_kernel_of_test
+#include "trace/list_kernel.inc.h"
+
+/* The last row is the nearest on one ray: each of the others would step on past all that follow. */
+static void steps_on_are_bounded(void **state)
+{
+    (void)state;
+    enum { COUNT = 500, LANE = 9 };
+    list_row row = {.color = {1, 0.5f, 0.25f}};
+    const used_list used = {.row = &row, .count = 1};
+    const vfloat16 one = vfloat16_set1(1), d_rgb[3] = {one, one, one};
+    list_scratch scratch = {0};
+    list_rows rows;
+    assert_true(reserve_rows_of_list(&scratch, COUNT, true, &rows));
+    for (int late = 0; late < 2; late++) {
+        rows.count = COUNT;
+        for (int i = 0; i < COUNT; i++) {
+            rows.order[i] = (uint32_t)i;
+            rows.number[i] = 0;
+            row_store(rows.t, i, vfloat16_set1(10 + (float)i));
+            row_store(rows.alpha, i, vfloat16_set1(0.001f + 1e-6f * (float)i));
+        }
+        if (late)
+            rows.t[(COUNT - 1) * PACKET_LANES + LANE] = 1;
+        insert_rows(&rows);
+        assert_false(rows.crowded);
+        const bool few = collect_behind(&rows, &used, d_rgb, one);
+        assert_true(few == !late && rows.steps <= 50 * COUNT + 1024);
+        if (!few)
+            assert_true(collect_behind_by_ray(&rows, &used, d_rgb, one, &scratch));
+        for (int lane = 0; lane < PACKET_LANES; lane++) {
+            double behind = 1;
+            for (int k = COUNT; k-- > 0;) { /* from the farthest on */
+                const bool turned = late && lane == LANE;
+                const int at = (turned ? (k + COUNT - 1) % COUNT : k) * PACKET_LANES + lane;
+                assert_near((double)rows.behind[at], behind, 5e-5 * behind);
+                behind += (double)rows.term[at];
+            }
+        }
+    }
+    list_scratch_free(&scratch);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(steps_on_are_bounded)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

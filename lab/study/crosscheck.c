@@ -194,8 +194,10 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
 
 static void name_sheet(const char *of, cross_view *v)
 {
-    snprintf(v->sheet, sizeof v->sheet, "crosscheck_%.120s_%.120s.png", of, v->name);
-    study_model_letters(v->sheet);
+    char name[CROSS_NAME_SIZE];
+    snprintf(name, sizeof name, "crosscheck_%.120s_%.120s.png", of, v->name);
+    study_model_letters(name);
+    memcpy(v->sheet, name, sizeof name);
 }
 
 /* With `pictures` and `traced` of the size of the camera. */

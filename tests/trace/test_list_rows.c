@@ -17,7 +17,7 @@ static void steps_on_are_bounded(void **state)
     const used_list used = {.row = &row, .count = 1};
     const vfloat16 one = vfloat16_set1(1), d_rgb[3] = {one, one, one};
     list_scratch scratch = {0};
-    list_rows rows;
+    list_rows rows = {0};
     assert_true(reserve_rows_of_list(&scratch, COUNT, true, &rows));
     for (int late = 0; late < 2; late++) {
         rows.count = COUNT;

@@ -726,6 +726,9 @@ static void a_photo_masked_whole(void **state)
     train_ok(folder, run, &def);
     def.exposure = true;
     train_ok(folder, halves, &def);
+    const gbt_evaluate_def own = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(run, &own, NULL));
+    assert_ok(gbt_evaluate(halves, &own, NULL));
     check_photo_psnr(run);
     check_photo_psnr(halves);
 
@@ -767,8 +770,7 @@ int main(void)
         cmocka_unit_test(bad_requests),           cmocka_unit_test(the_papers_tables),
         cmocka_unit_test(lpips_of_finished_runs), cmocka_unit_test(runs_are_made_once),
         cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
-        cmocka_unit_test(data_named_in_latin_1),
-        cmocka_unit_test(a_photo_masked_whole),
+        cmocka_unit_test(data_named_in_latin_1),  cmocka_unit_test(a_photo_masked_whole),
     };
     return cmocka_run_group_tests(tests, make_root, remove_root);
 }

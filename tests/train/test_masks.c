@@ -134,7 +134,7 @@ static void darken_left(image *photo, size_t view)
             photo->pixels[photo->channels * photo->width * y + i] *= 0.5f;
 }
 
-/* With exposures the left halves are for the matrix alone. */
+/* With exposures the left halves are for the matrix alone, but for the rounding of what it made. */
 static void fitted_scores_are_of_the_right_halves(void **state)
 {
     (void)state;
@@ -150,7 +150,7 @@ static void fitted_scores_are_of_the_right_halves(void **state)
         json_decref(metrics);
         change_photos(in_root("halves"), darken_left);
     }
-    assert_true(fitted[0] > 0 && fitted[0] == fitted[1] && psnr[0] != psnr[1]);
+    assert_true(fitted[0] > 0 && fabs(fitted[0] - fitted[1]) < 0.1 && fabs(psnr[0] - psnr[1]) > 1);
 }
 
 /* ---- pixels without a ray ---- */
@@ -488,6 +488,7 @@ static void steps_lay_photos_on_their_background(void **state)
         gbt_train_def def = run_def();
         def.start_level = 0;
         def.exposure = exposure;
+        def.find_exposure = false; /* it finds some in what the black behind them adds */
         trainer t;
         int laid = 0;
         open_ok(&t, folder, &def);

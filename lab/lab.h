@@ -138,7 +138,7 @@ gbt_status lab_study_stability(const lab_stability_def *def, const char *folder,
  * and the whole chain.
  *
  * Prints one row for each renderer and class of parameters: relative L2 error and limit. GBT_ERR_INTERNAL
- * when a limit is broken.
+ * when a limit is broken or too many rays are left out, GBT_ERR_FORMAT when every photo is masked whole.
  */
 gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err);
 

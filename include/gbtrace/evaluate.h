@@ -146,8 +146,7 @@ gbt_render_def gbt_render_def_default(void);
  *
  * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file
  * or a path file `split` is not used, and the others are refused. A film has its name when it is whole, not
- * before. SIGCHLD must not be ignored while it is made: how ffmpeg ends is not known then, and the film
- * fails.
+ * before. SIGCHLD must not be ignored while it is made: how ffmpeg ends is not known then.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

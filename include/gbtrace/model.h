@@ -75,7 +75,7 @@ gbt_status gbt_model_set_gaussians(gbt_model *model, const gbt_gaussians *g, gbt
 /**
  * The plain Gaussians of a model as they are drawn: quaternions of length 1, scales raised as
  * gbt_model_from_gaussians() does, and of a file without the rows that are not usable. In a model that is
- * made of them the picture is the same but for the rounding of floats.
+ * made of them and has the same settings the picture is the same but for the rounding of floats.
  *
  * @param mean, scale_log, quat, opacity, sh [out] shapes as in gbt_gaussians, with `gaussians` of
  *                                           gbt_model_get_info() as count; NULL: not wanted

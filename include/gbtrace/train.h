@@ -126,16 +126,17 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
  * @param settings [in] lines "key = value" with the keys of RUN/config; what is not named is as in
  *                      gbt_train_def_default()
  * @return as gbt_train(); GBT_ERR_FORMAT ("settings:LINE: ...") for a line that says nothing
+ * Threads: as gbt_train().
  */
 gbt_status gbt_train_with(const char *data, const char *run, const char *settings, gbt_error *err);
 
 /**
  * Keep every gbt_train() out of the folder `run`, as each keeps the others out: for what follows a training.
- * Until gbt_release_run(), or the end of the process.
+ * Until gbt_release_run(), or the end of the process. Where a file system knows no locks it does nothing.
  *
  * @param hold [out] for gbt_release_run(); unchanged after a failure
  * @return GBT_OK, or GBT_ERR_IO: somebody else has it, or it is no folder
- * Threads: any.
+ * Threads: any. With several processes (gbtrace/cluster.h) all call it, and the first one holds the folder.
  */
 gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err);
 void gbt_release_run(int hold);

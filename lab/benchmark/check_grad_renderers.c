@@ -15,7 +15,7 @@ enum { RAY_GRAIN = 16 };
    of coordinates alone is 1e-2 of a std-dev: five times that of the tests' random scenes. */
 static const double renderer_limit = 5e-5;
 static const double colour_limit = 1e-5; /* between splats in float and in double that blend the same */
-/* Rays that may be left out. Those of splats are left out because they were drawn wrong, which few may be. */
+/* Rays that may be left out. Of splats rounding makes few pixels differ: more are drawn wrong. */
 static const double left_out_limit = 0.9, left_out_limit_of_splats = 0.01;
 
 typedef struct band_job {

@@ -229,16 +229,20 @@ static bool take_name(reader *r, uint64_t *at, char out[EXR_NAME_MAX])
     return !r->is_short;
 }
 
-/* Channel names of a chlist attribute: how many, and whether one is alpha's, as OpenImageIO has it. */
-static int64_t exr_channels(reader *r, uint64_t at, uint64_t end, bool *has_alpha)
+/* Channel names of a chlist attribute: how many, and which are colours or alpha, as OpenImageIO has it. */
+static int64_t exr_channels(reader *r, uint64_t at, uint64_t end, image_header *out)
 {
     char name[EXR_NAME_MAX];
     int64_t count = 0;
+    unsigned found = 0;
     while (at < end && take_name(r, &at, name) && name[0] != '\0') {
-        *has_alpha = *has_alpha || strcasecmp(name, "A") == 0 || strcasecmp(name, "Alpha") == 0;
+        out->has_alpha = out->has_alpha || strcasecmp(name, "A") == 0 || strcasecmp(name, "Alpha") == 0;
+        for (unsigned c = 0; c < 3; c++)
+            found |= (strcasecmp(name, (const char *[]){"R", "G", "B"}[c]) == 0) << c;
         at += 16;
         count++;
     }
+    out->has_colors = found == 7 || count == 1 || (count == 2 && out->has_alpha); /* or grey */
     return count;
 }
 
@@ -265,7 +269,7 @@ static gbt_status read_exr(reader *r, image_header *out)
             break;
         }
         if (strcmp(name, "channels") == 0)
-            channels = exr_channels(r, at, at + length, &out->has_alpha);
+            channels = exr_channels(r, at, at + length, out);
         const bool is_display = strcmp(name, "displayWindow") == 0;
         if ((is_display || strcmp(name, "dataWindow") == 0) && length == 16) {
             take(r, at, bytes, 16);
@@ -288,7 +292,15 @@ static gbt_status read_exr(reader *r, image_header *out)
     return at + 8 < r->size ? GBT_OK : truncated(r, "EXR"); /* at least one offset and something behind it */
 }
 
-/* ---- entry ---- */
+/* ---- entries ---- */
+
+gbt_status image_header_colors(const char *path, const image_header *header, gbt_error *err)
+{
+    if (header->has_colors)
+        return GBT_OK;
+    return base_fail(err, GBT_ERR_FORMAT, "%s: EXR has no channels R, G and B (layers are not looked into)",
+                     path);
+}
 
 static gbt_status refuse_format(const reader *r, const unsigned char magic[12])
 {
@@ -307,7 +319,7 @@ gbt_status image_header_read(const char *path, image_header *out, gbt_error *err
 {
     static const unsigned char png[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'},
                                jpeg[3] = {0xff, 0xd8, 0xff}, exr[4] = {0x76, 0x2f, 0x31, 0x01};
-    *out = (image_header){.orientation = 1};
+    *out = (image_header){.orientation = 1, .has_colors = true};
     reader r = {.path = path, .fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), .err = err};
     struct stat info;
     if (r.fd < 0)

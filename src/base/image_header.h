@@ -24,6 +24,7 @@ typedef struct image_header {
     image_kind kind;
     int width, height;
     bool has_alpha;  /* image_read() gives 4 channels, else 3 */
+    bool has_colors; /* false: an EXR without channels R, G and B, which image_read() refuses */
     int orientation; /* EXIF: 1 as stored, 3 upside down, 6 and 8 on a side, ...; 1 when there is none */
 } image_header;
 
@@ -38,6 +39,9 @@ typedef struct image_header {
  * few reads, whatever the size of the file.
  */
 gbt_status image_header_read(const char *path, image_header *out, gbt_error *err);
+
+/** GBT_ERR_FORMAT, in the words of image_read(), for the header of a file without colours. */
+gbt_status image_header_colors(const char *path, const image_header *header, gbt_error *err);
 
 #ifdef __cplusplus
 }

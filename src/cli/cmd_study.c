@@ -58,7 +58,7 @@ static const command_word study_words[STUDY_COUNT + 1] = {
     {"rate", "file size against picture quality, of runs"},
     {"stability", "the scenes on which renderers of Gaussians are known to fail; takes no model"},
     {"paper", "the paper's four tables, by training on data sets"},
-    {"time", "held-out PSNR against training time, by training on data sets"},
+    {"time", "held-out PSNR against training time, by training on data sets of pinhole photos"},
     {"anchors", "held-out PSNR against the number of anchors, by training on data sets"},
     {NULL, NULL}};
 static const struct {

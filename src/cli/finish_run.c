@@ -6,7 +6,6 @@
 
 #include "cli/command.h"
 #include "cli/progress.h"
-#include "gbtrace/cluster.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/progress.h"
@@ -15,9 +14,8 @@
 gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
 {
     char model[4096];
-    int hold = 0;
-    const bool holds = gbt_cluster_rank() == 0;
-    gbt_status status = holds ? gbt_hold_run(run, &hold, err) : GBT_OK;
+    int hold;
+    gbt_status status = gbt_hold_run(run, &hold, err);
     if (status != GBT_OK)
         return status;
     if (snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
@@ -29,8 +27,7 @@ gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
     score.tensorboard = tensorboard;
     if (status == GBT_OK)
         status = gbt_evaluate(run, &score, err);
-    if (holds)
-        gbt_release_run(hold);
+    gbt_release_run(hold);
     return status;
 }
 

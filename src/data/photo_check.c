@@ -39,7 +39,7 @@ static void refuse(photo_check *c, size_t *kind, const gbt_error *why)
 static bool read_header(photo_check *c, const char *path, image_header *out)
 {
     gbt_error why = {0};
-    if (image_header_read(path, out, &why) == GBT_OK)
+    if (image_header_read(path, out, &why) == GBT_OK && image_header_colors(path, out, &why) == GBT_OK)
         return true;
     refuse(c, &c->unreadable, &why);
     return false;

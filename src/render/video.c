@@ -127,6 +127,11 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: %d x %d pixels (wanted even numbers: films keep colours for 2 x 2 pixels)",
                          path, width, height);
+    struct sigaction now;
+    if (sigaction(SIGCHLD, NULL, &now) == 0 && now.sa_handler == SIG_IGN)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: SIGCHLD is ignored, so that nobody knows how ffmpeg ends (wanted SIG_DFL)",
+                         path);
     /* ./: a name that begins with a dash is no option, and what stands before a colon no protocol. */
     if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
         snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", path[0] == '/' ? "" : "./", folder, path,
@@ -184,7 +189,7 @@ static int finish(video *v)
     if (v->process == 0)
         return 0;
     while (waitpid(v->process, &state, 0) < 0)
-        if (errno != EINTR) { /* SIGCHLD is ignored: nobody knows how it ended */
+        if (errno != EINTR) { /* nobody knows how it ended */
             state = 255 << 8;
             break;
         }

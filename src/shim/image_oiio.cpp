@@ -50,6 +50,7 @@ struct bytes_owner {
 /* Members are destroyed in reverse order, so the reader goes before the proxy and the bytes that it
    borrows. */
 struct opened_image {
+    image_header header;
     bytes_owner file;
     std::unique_ptr<OIIO::Filesystem::IOMemReader> proxy;
     std::unique_ptr<OIIO::ImageInput> input;
@@ -211,23 +212,11 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
     return GBT_OK;
 }
 
-/* The first three channels are colours, unless an EXR has others: those of a layer, or numbers. */
-gbt_status check_colors(const char *path, const opened_image &o, gbt_error *err)
-{
-    static const char *const wanted[] = {"R", "G", "B"};
-    const OIIO::ImageSpec &spec = o.input->spec();
-    for (int c = 0; c < 3 && !o.is_grey && std::strcmp(o.input->format_name(), "openexr") == 0; c++)
-        if (!OIIO::Strutil::iequals(spec.channel_name(c), wanted[c]))
-            return base_fail(err, GBT_ERR_FORMAT, "%s: EXR has no channels R, G and B (got \"%s\", ...)",
-                             path, spec.channel_name(0).c_str());
-    return GBT_OK;
-}
-
 /* The header comes first: what it refuses costs no memory. */
 gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
 {
     static const char *const plugins[] = {"png", "jpeg", "openexr"}; /* by image_kind */
-    image_header header;
+    image_header &header = o->header;
     gbt_status status = image_header_read(path, &header, err);
     if (status == GBT_OK)
         status = file_read(path, &o->file.bytes, &o->file.count, err);
@@ -323,7 +312,7 @@ gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, 
 gbt_status read_pixels(const char *path, opened_image *o, image *out, unsigned char **valid, gbt_error *err)
 {
     const OIIO::ImageSpec &spec = o->input->spec();
-    gbt_status status = check_colors(path, *o, err);
+    gbt_status status = image_header_colors(path, &o->header, err);
     if (status == GBT_OK)
         status = image_alloc(out, spec.width, spec.height, o->channels(), err);
     if (status != GBT_OK)

@@ -25,19 +25,6 @@ typedef int64_t m8
 /* Inlined into every clone. */
 #define LANE_CODE static inline __attribute__((always_inline))
 
-/* 0 where the lens has no ray at a corner. */
-static double corner_cosine(const gbt_camera *camera, const camera_lens *lens)
-{
-    double least = 1, dir[3];
-    for (int corner = 0; corner < 4; corner++) {
-        const int x = corner % 2 * camera->width, y = corner / 2 * camera->height;
-        if (!camera_lens_unproject(lens, x, y, dir))
-            return 0;
-        least = fmin(least, fmax(dir[2], 0));
-    }
-    return least;
-}
-
 footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *lens)
 {
     footprint_view view = {.kind = FOOTPRINT_ANGULAR};
@@ -49,8 +36,6 @@ footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *
         return view;
     if (camera_lens_looks_forward(lens))
         view.kind = lens->kind == LENS_ORTHOGRAPHIC ? FOOTPRINT_PARALLEL : FOOTPRINT_PERSPECTIVE;
-    if (view.kind == FOOTPRINT_PERSPECTIVE)
-        view.cosine_min = corner_cosine(camera, lens);
     view.pixel = 1 / sqrt(lens->fx * lens->fy);
     if (lens->kind == LENS_EQUIRECTANGULAR) {
         view.kind = FOOTPRINT_PANORAMA;
@@ -108,9 +93,9 @@ LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
 
 /* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle
    theta from the axis has the solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t
-   cos(theta); p = f^-1 cos^(3/2)(theta) t where cos(theta) is held at its least. Of a panorama columns are
-   closer above and below: a pixel at the latitude phi has cos(phi) times the solid angle of one on the
-   horizon, so p = p_0 t cos^(1/2)(phi). */
+   cos(theta). What is behind is seen in mirrors alone, and by one across the axis as if it stood in front; at
+   the sides the cosine is held. Of a panorama columns are closer above and below: a pixel at the latitude phi
+   has cos(phi) times the solid angle of one on the horizon, so p = p_0 t cos^(1/2)(phi). */
 LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_point[3])
 {
     const d8 pixel = d8_set(view->pixel), none = d8_set(0);
@@ -132,10 +117,11 @@ LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_po
             d_point[k] = 0.5 * pixel * (root * dir[k] + d8_over(dir[k] - cosine * axis[k], level * root));
         return pixel * t * root;
     }
-    const m8 inside = cosine > view->cosine_min;
-    const d8 ahead = d8_select(inside, cosine, d8_set(view->cosine_min)), root = d8_sqrt(ahead);
+    const d8 side = d8_select(cosine < 0, d8_set(-1), d8_set(1)), least = d8_set(FOOTPRINT_COSINE_MIN);
+    const m8 varies = side * cosine > least;
+    const d8 ahead = d8_select(varies, side * cosine, least), root = d8_sqrt(ahead);
     for (int k = 0; k < 3; k++)
-        d_point[k] = pixel * d8_select(inside, 1.5 * root * axis[k] - 0.5 * root * ahead * dir[k],
+        d_point[k] = pixel * d8_select(varies, 1.5 * root * side * axis[k] - 0.5 * root * ahead * dir[k],
                                        root * ahead * dir[k]);
     return pixel * t * ahead * root;
 }
@@ -146,16 +132,6 @@ void footprint_pixels(const footprint_view *view, double point[3][LANES], double
     memcpy(at, point, sizeof at);
     const d8 distance = look(view, at, dir), there = pixel_at(view, distance, dir, unused);
     memcpy(pixel, &there, sizeof there);
-}
-
-double footprint_pixel(const footprint_view *view, const double point[3])
-{
-    double at[3][LANES], pixel[LANES];
-    for (int k = 0; k < 3; k++)
-        for (int lane = 0; lane < LANES; lane++)
-            at[k][lane] = point[k];
-    footprint_pixels(view, at, pixel);
-    return pixel[0];
 }
 
 /* ---- widening ---- */

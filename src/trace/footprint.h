@@ -28,8 +28,6 @@ typedef struct footprint_view {
     double center[3], axis[3]; /* of the camera; axis: forward, or down for a panorama; unit */
     double pixel; /* size of a pixel at distance 1: on the axis (perspective), everywhere (angular), on the
                      horizon (panorama); at any distance (parallel) */
-    double cosine_min; /* perspective: of the angle to the picture's farthest corner; beyond it pixels get no
-                          smaller */
 } footprint_view;
 
 /** Distorted lenses are taken as the lens without distortion. A camera that sees nothing has pixels of size
@@ -39,14 +37,13 @@ footprint_view footprint_view_of(const gbt_camera *camera);
 /** The same with the camera's lens as it was prepared; NULL: it sees nothing. */
 footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *lens);
 
-/** Size of a pixel at a point, scene units: the square root of the area that its cone cuts there; of fisheyes
-    the radial size of a pixel. Beside and behind a perspective camera, where mirrors look, it is that of the
-    picture's farthest corner, at the point's distance; 0 there when the lens has no ray at a corner. */
-double footprint_pixel(const footprint_view *view, const double point[3]);
-
 enum { FOOTPRINT_LANES = 8 };
 
-/** The same of so many points in the time of one. */
+/** Of the angle to a perspective camera's axis: pixels beyond it, 75.5 degrees, count as of that angle. */
+#define FOOTPRINT_COSINE_MIN 0.25
+
+/** Sizes of a pixel at points, scene units: the square root of the area that its cone cuts there; of fisheyes
+    the radial size of a pixel. Behind a perspective camera they are those in front of it, mirrored. */
 void footprint_pixels(const footprint_view *view, double point[3][FOOTPRINT_LANES],
                       double pixel[FOOTPRINT_LANES]);
 

@@ -193,13 +193,13 @@ enum { MIDDLE = PACKET_PIXELS + 1 };
 /* The depth of a row for one order of all rays (trace_settings.packet_order). A plane seen from its edge may
    be anywhere on a ray beside it, also behind its start: where the middle ray has no hit, the next one that
    has says about how far it is. */
-static inline float packet_depth(const list_rows *rows, size_t i)
+static inline float packet_depth(const list_rows *rows, size_t i, float t_near)
 {
     const float *t = rows->t + i * PACKET_LANES;
     const unsigned hit = vmask16_bits(vfloat16_lt(vfloat16_set1(0), row_load(rows->alpha, (int)i)));
     const int ahead = __builtin_ctz((hit | hit << PACKET_LANES) >> MIDDLE);
     const float near_by = t[(MIDDLE + ahead) % PACKET_LANES];
-    return larger(0.5f * near_by, smaller(t[MIDDLE], 2 * near_by)); /* NaN: twice */
+    return larger(larger(0.5f * near_by, t_near), smaller(t[MIDDLE], 2 * near_by)); /* NaN: twice */
 }
 
 /* The rows in the order of their depth on a ray in the middle; those of the same depth, in that of the tile's
@@ -211,8 +211,8 @@ static void order_by_middle(const kernel_scene *scene, const tile_list *list, li
     const size_t count = rows->count;
     bool cut = false;
     for (size_t i = 0; i < count; i++) {
-        const float t =
-            scene->settings.packet_order ? packet_depth(rows, i) : fabsf(rows->t[i * PACKET_LANES + MIDDLE]);
+        const float t = scene->settings.packet_order ? packet_depth(rows, i, scene->settings.t_near)
+                                                     : fabsf(rows->t[i * PACKET_LANES + MIDDLE]);
         rows->key[i] = t < FLT_MAX ? t : FLT_MAX; /* NaN, too */
     }
     for (size_t i = 0; list->any_general && i < count; i++) {

@@ -25,7 +25,7 @@
     all. */
 typedef enum trace_kernel {
     TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
-                     point; other rays as TRACE_TILE */
+                     point and not too many Gaussians are near it; else as TRACE_TILE */
     TRACE_TILE,   /* 16 x 16 pixels share one way through the tree */
     TRACE_SINGLE, /* ray by ray: for rays that do not run together */
     TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */

@@ -7,6 +7,7 @@
 #include "train/photos.h"
 #include "train/rules.h"
 #include "train/seed_points.h"
+#include "train/seen_points.h"
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
@@ -27,10 +28,11 @@ memory_need memory_need_of(const scene *s, double downscale)
         train_count += !v->is_test;
         train_bytes += v->is_test ? 0 : (3 + (v->mask_path != NULL) + v->has_alpha) * pixels;
     }
-    const double seeding = s->points.count > 0 ? 0
-                                               : fmin(train_count, SEED_VIEWS_MOST) * SEED_PIXEL_BYTES *
-                                                     fmin(largest, (double)SEED_LONG_SIDE * SEED_LONG_SIDE);
-    const double points = s->points.count > 0 ? (double)s->points.count : found_points,
+    const bool seeds = s->points.count < SEED_FEW_PLACES || !seen_points_tell(s);
+    const double seeding = !seeds ? 0
+                                  : fmin(train_count, SEED_VIEWS_MOST) * SEED_PIXEL_BYTES *
+                                        fmin(largest, (double)SEED_LONG_SIDE * SEED_LONG_SIDE);
+    const double points = seeds ? fmax((double)s->points.count, found_points) : (double)s->points.count,
                  learning = fmin(points, most_points);
     memory_need need = {
         .program = program_bytes,

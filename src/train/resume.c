@@ -79,6 +79,14 @@ static pace pace_of_time_spent(const trainer *t, double budget_seconds)
     return p;
 }
 
+/* Only what is gathered from here on is counted by the new schedule; 0 is a run before its first round. */
+static void change_pace(trainer *t, pace p)
+{
+    t->pace = p;
+    if (t->round_step > 0)
+        t->round_step = t->step;
+}
+
 static gbt_status change_length(trainer *t, const char *run, const gbt_train_def *asked, gbt_error *err)
 {
     gbt_train_def *own = &t->def;
@@ -91,7 +99,7 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
                 (unsigned long long)asked->iterations, (unsigned long long)t->step);
         own->iterations = asked->iterations;
         own->pace = NULL;
-        t->pace = pace_of_iterations(own->iterations);
+        change_pace(t, pace_of_iterations(own->iterations));
         log_info(
             "%s: %llu steps done; training goes on to step %llu, with the schedules of a run of that length",
             run, (unsigned long long)t->step, (unsigned long long)own->iterations);
@@ -105,7 +113,7 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
         own->iterations = 0;
         own->budget_seconds = asked->budget_seconds;
         own->pace = NULL;
-        t->pace = pace_of_time_spent(t, own->budget_seconds);
+        change_pace(t, pace_of_time_spent(t, own->budget_seconds));
         log_info(
             "%s: %.1f s of training done; it goes on to %g s, with the schedules of a run of that length",
             run, t->seconds, own->budget_seconds);

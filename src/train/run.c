@@ -37,10 +37,17 @@ gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
 
 gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err)
 {
-    return file_lock_folder(run, hold, err);
+    int lock = -1;
+    GBT_TRY(cluster_follow(cluster_leads() ? file_lock_folder(run, &lock, err) : GBT_OK, err));
+    *hold = lock;
+    return GBT_OK;
 }
 
-void gbt_release_run(int hold) { file_unlock_folder(hold); }
+void gbt_release_run(int hold)
+{
+    if (hold >= 0)
+        file_unlock_folder(hold);
+}
 
 /* ---- the run's folder ---- */
 

@@ -7,6 +7,7 @@
 #include "train/photos.h"
 
 enum {
+    SEED_FEW_PLACES = 128, /* points of a data set at fewer different places are too few */
     SEED_VIEWS_MOST = 512, /* photos that are looked at; of more, so many at even distances in their list */
     SEED_LONG_SIDE = 400   /* photos are halved until they are no longer than this */
 };

@@ -26,7 +26,8 @@ enum { STREAM_NETWORKS = 2, DISTANCE_VIEWS = 4096 };
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
-    const size_t step = t->train_count / DISTANCE_VIEWS + 1, views = (t->train_count + step - 1) / step;
+    const size_t step = (t->train_count + DISTANCE_VIEWS - 1) / DISTANCE_VIEWS,
+                 views = (t->train_count + step - 1) / step;
     float *all = mem_alloc(per_view * views + 1, sizeof *all, "distances", err);
     if (all == NULL)
         return GBT_ERR_NO_MEMORY;

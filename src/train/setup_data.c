@@ -16,8 +16,6 @@
 #include "train/seed_points.h"
 #include "train/seen_points.h"
 
-enum { FEW_PLACES = 128 };
-
 /* ---- points ---- */
 
 static int compare_points(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(float)); }
@@ -60,8 +58,8 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     size_t places = 0;
     const bool blind = !seen_points_tell(&t->scene);
     if (!blind)
-        GBT_TRY(count_places(points, FEW_PLACES, &places, err));
-    const bool few = places < FEW_PLACES && t->rules.adds_to_few_points;
+        GBT_TRY(count_places(points, SEED_FEW_PLACES, &places, err));
+    const bool few = places < SEED_FEW_PLACES && t->rules.adds_to_few_points;
     t->points_used = points->count;
     snprintf(t->start_text, sizeof t->start_text, "%zu sparse points", points->count);
     if (!blind && !few)

@@ -207,7 +207,7 @@ outside() {
     "$program" train case/data -o case/late --overwrite --iterations 6 --threads 1 --quiet >said 2>&1
     code=$?
     [ $code = 4 ] && [ "$(grep -c '^error: case/late: another process' said)" = 1 ] || bad "a second trainer while the first scores" "exit code $code"
-    timeout 60 cat case/late/metrics.json >scores && [ -s scores ] || kill -KILL $pid
+    [ -p case/late/metrics.json ] && timeout 60 cat case/late/metrics.json >scores && [ -s scores ] || kill -KILL $pid
     wait $pid
     code=$?
     cp long said

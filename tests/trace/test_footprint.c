@@ -46,6 +46,16 @@ static footprint_gaussian random_gaussian(uint64_t seed)
     return g;
 }
 
+static double footprint_pixel(const footprint_view *view, const double point[3])
+{
+    double at[3][FOOTPRINT_LANES], pixel[FOOTPRINT_LANES];
+    for (int k = 0; k < 3; k++)
+        for (int lane = 0; lane < FOOTPRINT_LANES; lane++)
+            at[k][lane] = point[k];
+    footprint_pixels(view, at, pixel);
+    return pixel[0];
+}
+
 /* Every number of a Gaussian by its index: mean, scale, quaternion, opacity. */
 static double *number_of(footprint_gaussian *g, int i)
 {
@@ -56,15 +66,15 @@ static void test_sizes(void **state)
 {
     (void)state;
     gbt_camera c = camera_of(GBT_CAMERA_PINHOLE);
-    c.width = 160, c.height = 120, c.params[2] = 80, c.params[3] = 60; /* 51 degrees to the corners */
     footprint_view view = footprint_view_of(&c);
     assert_true(fabs(footprint_pixel(&view, (double[]){0.3, -0.2, 2}) - 8 / 80.0) < 1e-12);
     /* 45 degrees off the axis at distance t: t cos^(3/2) / f */
     assert_true(fabs(footprint_pixel(&view, (double[]){2.3, -0.2, -4}) - sqrt(8) * pow(0.5, 0.75) / 80) <
                 1e-12);
-    /* behind: as in a corner, where the tangent is 1.25 */
-    assert_true(fabs(footprint_pixel(&view, (double[]){0, 0, -7}) - sqrt(1.13) * pow(2.5625, -0.75) / 80) <
+    /* mirrored behind; at the side no less than at 75.5 degrees */
+    assert_true(fabs(footprint_pixel(&view, (double[]){2.3, -0.2, -8}) - sqrt(8) * pow(0.5, 0.75) / 80) <
                 1e-12);
+    assert_true(fabs(footprint_pixel(&view, (double[]){8.3, -0.2, -6}) - 8 * 0.125 / 80) < 1e-12);
     assert_true(footprint_pixel(&view, c.center) == 0);
     c = camera_of(GBT_CAMERA_ORTHOGRAPHIC);
     view = footprint_view_of(&c);

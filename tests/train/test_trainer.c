@@ -850,6 +850,20 @@ static void points_are_made_where_there_are_none(void **state)
 
 /* ---- hostile surroundings ---- */
 
+/* Before data are read. */
+static void closed_folders_are_told_first(void **state)
+{
+    (void)state;
+    if (geteuid() == 0) /* who may write everywhere */
+        skip();
+    gbt_train_def def = run_def();
+    const char *closed = in_root("closed/checkpoints");
+    assert_ok(file_make_folder(closed, NULL));
+    assert_int_equal(chmod(closed, 0555), 0);
+    train_fails(in_root("nowhere"), in_root("closed"), &def, GBT_ERR_IO, "checkpoints: cannot create");
+    assert_int_equal(chmod(closed, 0755), 0);
+}
+
 static void data_without_training_photos_is_refused(void **state)
 {
     (void)state;
@@ -869,13 +883,6 @@ static void data_without_training_photos_is_refused(void **state)
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
     train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
-    if (geteuid() != 0) { /* who may write everywhere */
-        const char *closed = in_root("closed/checkpoints");
-        assert_ok(file_make_folder(closed, NULL));
-        assert_int_equal(chmod(closed, 0555), 0);
-        train_fails(in_root("nowhere"), in_root("closed"), &def, GBT_ERR_IO, "checkpoints: cannot create");
-        assert_int_equal(chmod(closed, 0755), 0);
-    }
     char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
     snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
     make_tiny_scene(two_lines); /* no run could be opened again that names this */
@@ -1954,6 +1961,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(new_geometry_begins_at_its_own_pace),
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
+        cmocka_unit_test(closed_folders_are_told_first),
         cmocka_unit_test(data_without_training_photos_is_refused),
         cmocka_unit_test(validation_needs_no_held_out_photo),
         cmocka_unit_test(a_run_is_overwritten_only_when_asked),

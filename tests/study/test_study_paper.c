@@ -542,7 +542,7 @@ static void bad_requests(void **state)
     gbt_make_scene_def wide = gbt_make_scene_def_default();
     wide.lens = GBT_MAKE_SCENE_FISHEYE;
     wide.width = wide.height = 32;
-    wide.view_count = 2;
+    wide.view_count = VIEWS;
     wide.samples = 1;
     assert_ok(gbt_make_scene(&wide, in_root("wide"), &assert_ok_err_));
     const char *with_wide[] = {tiny, in_root("wide")};

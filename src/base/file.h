@@ -43,6 +43,10 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
+/** Before the process ends while other threads are at work: files that file_write_atomic() writes are brought
+   to their end, for at most five seconds, and it begins no other. */
+void file_writes_end(void);
+
 /** Before work whose result goes there: GBT_ERR_IO when a file cannot be created or replaced, because its
     folder is not there or cannot be written, or it is a folder itself. Nothing is written. */
 gbt_status file_check_creatable(const char *path, gbt_error *err);

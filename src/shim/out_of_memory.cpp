@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 extern "C" {
+#include "base/file.h"
 #include "base/library_end.h"
 #include "gbtrace/train.h"
 }
@@ -24,8 +25,10 @@ static thread_local bool exit_is_failure;
 static void end_once()
 {
     static std::atomic_flag ended = ATOMIC_FLAG_INIT;
-    if (!ended.test_and_set())
+    if (!ended.test_and_set()) {
+        file_writes_end(); /* their temporary files would be left */
         end_process();
+    }
     for (;;)
         pause(); /* another thread has begun to end the process */
 }

@@ -871,6 +871,19 @@ static void assert_same(const traced *a, const traced *b, size_t rays, size_t co
     assert_memory_equal(&a->counters, &b->counters, sizeof a->counters);
 }
 
+/* With the threads that are set. */
+static void assert_same_on_all_sets(const traced *first, const gaussians *g, const trace_settings *s,
+                                    const ray_image *rays, const image *d_rgb)
+{
+    for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++) {
+        cpu_limit_isa(isa);
+        traced again = trace_all(g, s, rays, d_rgb);
+        assert_same(first, &again, ray_image_count(rays), g->count);
+        traced_free(&again);
+    }
+    cpu_limit_isa(CPU_AVX512);
+}
+
 /* A row that comes last on the middle rays, and on few others first: the adjoint goes past it once for each
    row in front, and then sorts the rays one by one. */
 static void the_last_row_is_near_on_few_rays(void **state)
@@ -902,13 +915,7 @@ static void the_last_row_is_near_on_few_rays(void **state)
     image d_rgb = random_gradient(&rays, 63);
     cpu_limit_isa(CPU_PLAIN);
     traced first = trace_all(&g, &s, &rays, &d_rgb);
-    for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++) {
-        cpu_limit_isa(isa);
-        traced again = trace_all(&g, &s, &rays, &d_rgb);
-        assert_same(&first, &again, ray_image_count(&rays), g.count);
-        traced_free(&again);
-    }
-    cpu_limit_isa(CPU_AVX512);
+    assert_same_on_all_sets(&first, &g, &s, &rays, &d_rgb);
     traced_free(&first);
     image_free(&d_rgb);
     ray_image_free(&rays);
@@ -939,15 +946,10 @@ static void instruction_sets_and_threads_give_the_same_bits(void **state)
         cpu_limit_isa(CPU_PLAIN);
         traced first = trace_all(&g, &s, &rays, &d_rgb);
         spilled += first.counters.spilled_packets;
-        for (cpu_isa isa = CPU_PLAIN; isa <= CPU_AVX512; isa++)
-            for (int threads = 1; threads <= 16; threads = threads < 3 ? threads + 1 : threads + 13) {
-                cpu_limit_isa(isa);
-                parallel_set_threads(threads);
-                traced again = trace_all(&g, &s, &rays, &d_rgb);
-                assert_same(&first, &again, ray_image_count(&rays), g.count);
-                traced_free(&again);
-            }
-        cpu_limit_isa(CPU_AVX512);
+        for (int threads = 1; threads <= 16; threads = threads < 3 ? threads + 1 : threads + 13) {
+            parallel_set_threads(threads);
+            assert_same_on_all_sets(&first, &g, &s, &rays, &d_rgb);
+        }
         traced_free(&first);
         image_free(&d_rgb);
         ray_image_free(&rays);

@@ -81,6 +81,16 @@ static inline void make_tiny_scene(const char *folder)
         fail_msg("%s", err.text);
 }
 
+/* The end of a frame of a transforms.json. */
+static inline void put_pose(FILE *file, const scene *s, size_t view)
+{
+    const double *r = s->views[view].camera.rotation, *at = s->views[view].camera.center;
+    fprintf(file, "\"transform_matrix\": [");
+    for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
+        fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s->origin[k]);
+    fprintf(file, "[0, 0, 0, 1]]}");
+}
+
 static inline int make_root(void **state)
 {
     (void)state;

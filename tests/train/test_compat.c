@@ -317,11 +317,8 @@ static void write_blender(const char *folder)
         assert_ok(image_write(path, &with_alpha, NULL));
         image_free(&with_alpha);
         image_free(&photo);
-        const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
-        fprintf(file, "%s{\"file_path\": \"./train/%zu\", \"transform_matrix\": [", i > 0 ? ", " : "", i);
-        for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
-            fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
-        fprintf(file, "[0, 0, 0, 1]]}");
+        fprintf(file, "%s{\"file_path\": \"./train/%zu\", ", i > 0 ? ", " : "", i);
+        put_pose(file, &s, i);
     }
     fprintf(file, "]}\n");
     assert_int_equal(fclose(file), 0);

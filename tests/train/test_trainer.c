@@ -766,12 +766,8 @@ static void write_transforms(const char *folder)
             "\"frames\": [",
             c->width, c->height, c->params[0], c->params[1], c->params[2], c->params[3]);
     for (size_t i = 0; i < s.view_count; i++) {
-        const double *r = s.views[i].camera.rotation, *at = s.views[i].camera.center;
-        fprintf(file, "%s{\"file_path\": \"images/%s\", \"transform_matrix\": [", i > 0 ? ", " : "",
-                s.views[i].name);
-        for (int k = 0; k < 3; k++) /* columns: x right, y up, z back */
-            fprintf(file, "[%.17g, %.17g, %.17g, %.17g], ", r[k], -r[3 + k], -r[6 + k], at[k] + s.origin[k]);
-        fprintf(file, "[0, 0, 0, 1]]}");
+        fprintf(file, "%s{\"file_path\": \"images/%s\", ", i > 0 ? ", " : "", s.views[i].name);
+        put_pose(file, &s, i);
     }
     fprintf(file, "]}\n");
     assert_int_equal(fclose(file), 0);

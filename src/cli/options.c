@@ -181,6 +181,8 @@ static int walk(const option_table *t, bool common, int argc, char **argv, bool 
         if (code != GO_ON)
             return code;
         const option *o = &t->rows[a.index < 0 ? 0 : a.index];
+        if (a.index >= 0 && o->kind == OPTION_ELSEWHERE) /* its value may look like an option */
+            return apply(&a, o, argc, argv, &i);
         if (a.index >= 0 && common && a.index < t->own) {
             if (options_takes_value(o))
                 take_value(&a, argc, argv, &i);

@@ -8,6 +8,8 @@
 
 #include "gbtrace/progress.h"
 
+#define RATES(of) of "-lr-init " of "-lr-final " of "-lr-delay-mult " of "-lr-max-steps "
+
 /* Other programs have these. */
 static const option elsewhere[] = {
     /* What people type who come from 3DGS and Scaffold-GS. */
@@ -18,7 +20,10 @@ static const option elsewhere[] = {
     {.name = "white-background",
      .kind = OPTION_ELSEWHERE,
      .aliases = "w",
-     .help = "what no Gaussian covers shows the mean colour of the points; leave it out"},
+     .help = "use --alpha white (the default of Blender's scenes)"},
+    {.name = "random-background",
+     .kind = OPTION_ELSEWHERE,
+     .help = "half of the steps from the middle of a run have one; leave it out"},
     {.name = "sh-degree",
      .kind = OPTION_ELSEWHERE,
      .help = "colours come from networks; gbtrace export has --sh-degree"},
@@ -32,11 +37,11 @@ static const option elsewhere[] = {
     {.name = "start-checkpoint", .kind = OPTION_ELSEWHERE, .help = "use --resume with the same -o RUN"},
     {.name = "data-device",
      .kind = OPTION_ELSEWHERE,
-     .aliases = "gpu",
+     .aliases = "gpu debug debug-from detect-anomaly convert-SHs-python compute-cov3D-python optimizer-type",
      .help = "everything runs on the CPU; leave it out"},
     {.name = "ip",
      .kind = OPTION_ELSEWHERE,
-     .aliases = "port",
+     .aliases = "port disable-viewer",
      .help = "gbtrace view RUN shows a run while it trains"},
     {.name = "lambda-dssim", .kind = OPTION_ELSEWHERE, .help = "it is 0.2; leave it out"},
     {.name = "densify-until-iter",
@@ -45,12 +50,15 @@ static const option elsewhere[] = {
      .help = "use --grow-until F, a fraction of the run"},
     {.name = "densify-grad-threshold",
      .kind = OPTION_ELSEWHERE,
-     .aliases = "densification-interval opacity-reset-interval percent-dense update-interval",
+     .aliases = "densification-interval opacity-reset-interval percent-dense update-interval update-depth "
+                "update-init-factor update-hierachy-factor success-threshold min-opacity",
      .help = "growth follows the length of the run; --max-anchors N limits it"},
     {.name = "position-lr-init",
      .kind = OPTION_ELSEWHERE,
-     .aliases = "position-lr-final position-lr-max-steps feature-lr opacity-lr scaling-lr rotation-lr "
-                "offset-lr-init offset-lr-final",
+     .aliases = "position-lr-final position-lr-delay-mult position-lr-max-steps feature-lr opacity-lr "
+                "scaling-lr rotation-lr exposure-lr-init exposure-lr-final exposure-lr-delay-steps "
+                "exposure-lr-delay-mult " RATES("offset") RATES("mlp-opacity") RATES("mlp-cov")
+                    RATES("mlp-color") RATES("mlp-featurebank") RATES("appearance"),
      .help = "use --learning-rate F, which multiplies all rates"},
     {.name = "train-test-exp",
      .kind = OPTION_ELSEWHERE,
@@ -59,7 +67,18 @@ static const option elsewhere[] = {
     {.name = "antialiasing",
      .kind = OPTION_ELSEWHERE,
      .help = "rays are as wide as pixels already (--footprint)"},
-    {.name = "depths", .kind = OPTION_ELSEWHERE, .help = "depth maps are not read; leave it out"},
+    {.name = "depths",
+     .kind = OPTION_ELSEWHERE,
+     .aliases = "depth-l1-weight-init depth-l1-weight-final",
+     .help = "depth maps are not read; leave it out"},
+    {.name = "add-opacity-dist",
+     .kind = OPTION_ELSEWHERE,
+     .aliases = "add-cov-dist add-color-dist",
+     .help = "use --distance on"},
+    {.name = "use-feat-bank",
+     .kind = OPTION_ELSEWHERE,
+     .aliases = "feat-dim lod warmup ratio undistorted",
+     .help = "there is nothing like it; leave it out"},
 };
 
 enum { ELSEWHERE_COUNT = sizeof elsewhere / sizeof *elsewhere, NAME_SIZE = 32 };

@@ -34,7 +34,7 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &out,
          .value_name = "DIR",
-         .help = "folder for the scene and the run"},
+         .help = "folder for the scene and its run, which are made anew; a run of other data is left alone"},
         {.name = "minutes",
          .kind = OPTION_DOUBLE,
          .value = &minutes,
@@ -57,6 +57,20 @@ static const option *options(int *count)
     return rows;
 }
 
+/* Whether a run is of the scene beside it, as its file data_places says in its last line. */
+static bool is_of_scene(const char *run_folder)
+{
+    char path[4200], line[4200] = "";
+    snprintf(path, sizeof path, "%s/data_places", run_folder);
+    FILE *file = fopen(path, "r");
+    if (file == NULL)
+        return false;
+    while (fgets(line, sizeof line, file) != NULL) {
+    }
+    fclose(file);
+    return strcmp(line, "../scene\n") == 0;
+}
+
 static int run(const operands *given)
 {
     (void)given; /* it takes none */
@@ -71,7 +85,7 @@ static int run(const operands *given)
              (unsigned long long)train.seed);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
-    train.overwrite = true;
+    train.overwrite = is_of_scene(run_folder);
     scene.name = gbt_make_scene_names()[scene_index];
     gbt_error err = {0};
     progress_say("1/3 photographing the procedural scene \"%s\"", scene.name);

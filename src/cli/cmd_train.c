@@ -28,8 +28,8 @@ static const option own_rows[] = {
     {.name = "eval",
      .kind = OPTION_STRING,
      .value = &def.eval_split,
-     .fixed = "every=8",
-     .help = "the same as --eval-split every=8",
+     .fixed = "auto",
+     .help = "hold out as the data set says, else every eighth photo (the default)",
      .rare = true},
     {.name = "eval-at",
      .kind = OPTION_STRING,
@@ -54,10 +54,17 @@ static int run(const operands *given)
     if (given->count == 0 && !def.resume)
         return command_misused("argument missing (usage: gbtrace %s %s)", command_train.name,
                                command_train.usage);
-    if (def.resume && !options_typed(&def.iterations)) /* a file or variable speaks of all runs */
+    const bool by_count = options_typed(&def.iterations), by_time = options_typed(&def.budget_seconds);
+    if (by_count && by_time && def.iterations > 0 && def.budget_seconds > 0)
+        return command_misused("--budget: not with --iterations");
+    /* A file or variable speaks of all runs: it sets no length of one that is resumed, and gives way to a
+       length that was typed. */
+    if ((def.resume || by_time) && !by_count)
         def.iterations = 0;
-    if (def.resume && !options_typed(&def.budget_seconds))
+    if (def.resume && !by_time)
         def.budget_seconds = 0;
+    if ((by_count || by_time) && !options_typed(&def.pace))
+        def.pace = NULL;
     gbt_error err = {0};
     gbt_status status = train_options_finish(&def, eval_at, given, &err);
     if (status == GBT_OK)

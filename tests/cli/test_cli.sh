@@ -147,10 +147,19 @@ misuse 4 "nothing: no such file or folder" train --source_path nothing --model_p
 misuse 2 "--output: given twice" train -s nothing -m run --output run
 misuse 4 "nothing: no such file or folder" train nothing -o run --budget 10min
 misuse 2 "-r: bad value (wanted a number from 0 to 64, got 800)" train -s nothing -m run -r 800
-misuse 2 "--white_background: not here; what no Gaussian covers shows the mean colour of the points; leave it out" train -s d -m r --white_background
+misuse 2 "--budget: not with --iterations" train nothing -o run --iterations 20 --budget 3s
+misuse 2 "--white_background: not here; use --alpha white (the default of Blender's scenes)" train -s d -m r --white_background
 misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4
 misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
+misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations -1
 misuse 2 "--position_lr_init: not here; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
+for name in random_background position_lr_delay_mult exposure_lr_init offset_lr_max_steps mlp_opacity_lr_init appearance_lr_final optimizer_type \
+    convert_SHs_python debug disable_viewer depth_l1_weight_init update_init_factor min_opacity success_threshold use_feat_bank add_opacity_dist lod; do
+    "$program" train -s d -m r --$name 1 >out 2>err
+    got=$?
+    [ "$got" = 2 ] && grep -q "^error: --$name: not here; " err
+    report $? "--$name of other programs" "  got $got: $(cat err out)"
+done
 misuse 4 "nothing: not a run folder (wanted what gbtrace train wrote)" metrics -m nothing
 # Where results go is looked at before anything else.
 misuse 4 "nowhere/x.ply: cannot create: No such file or directory" export nothing x.ply nowhere/x.ply

@@ -47,11 +47,20 @@ report $? "a resumed run keeps its scores on the way" "$(cat err out)"
     GBTRACE_TRAIN_BUDGET=1s "$program" train -o halved --resume --config longer.conf >out 2>&1 && "$program" info halved | grep -q 'trained   40 iterations' &&
     GBTRACE_TRAIN_BUDGET=0.001s "$program" train -o halved --resume >out 2>&1 && grep -q '^halved: all 40 steps are done' out
 report $? "lengths in a file or a variable change no run that is resumed" "$(cat out; "$program" info halved)"
+printf 'iterations = 20\npace = %s\n' "$(seq -s , 20 | sed 's/[0-9][0-9]*/1/g')" >length.conf
+GBTRACE_TRAIN_ITERATIONS=20 "$program" train made -o timed --config length.conf --budget 0.6s --quiet >out 2>&1 &&
+    [ "$(grep -c -x -e 'iterations = 0' -e 'budget-seconds = 0.6' -e 'pace = ' timed/config)" = 3 ] &&
+    "$program" train made -o counted --config length.conf --iterations 4 --quiet >>out 2>&1 && "$program" info counted | grep -q 'trained   4 iterations'
+report $? "a length that is typed wins over those in a file or a variable" "$(cat out timed/config; "$program" info counted)"
 mkdir wide && cp -r made/* wide && holds "a sky that is learned" 0 '^2 held-out views: ' train wide -o wide/run --iterations 5 --background sky
 "$program" make-scene tabletop -o rolled --lens rolling --width 32 --height 24 --views 3 --samples 1 --points 60 --quiet >out 2>&1 && cp -r rolled/images rolled/masks &&
     "$program" info rolled >out 2>err && grep -q '^warning: rolled/masks: not used: no frame of rolled/transforms.json names a mask in it (mask_path)$' err
 report $? "masks that no frame names" "$(cat err out)"
 holds "and what it was trained with" 0 '^  config    background = sky$' info wide/run
+cp -r rolled own && sed '1s|{|{"train_filenames": ["images/0000.png", "images/0001.png"],|' rolled/transforms.json >own/transforms.json &&
+    "$program" train own -o own-run --eval --iterations 3 >out 2>err && grep -q ': 2 photos to train on, 1 held out; ' err &&
+    tr -d ' \n' <own-run/metrics.json | grep -q '"views":.{"name":"images/0002.png"'
+report $? "--eval holds out what the data set says" "$(cat err out; head -c 300 own/transforms.json)"
 printf '0001.png\n0005.png\n' >names.txt && "$program" train made -o listed --iterations 3 --eval-split list=names.txt --quiet >out 2>err && rm names.txt &&
     mkdir apart && (cd apart && "$program" eval ../listed) >out 2>>err && grep -q '^2 held-out views: ' err && "$program" train --config listed/config -o again --quiet >>out 2>>err &&
     cmp again/held-out.txt listed/held-out.txt >>err && cat listed/report.html | grep -q ' --eval-split list=names.txt'
@@ -60,6 +69,11 @@ report $? "a list of held-out photos stays with the run" "$(cat err out; cat lis
     (cd apart && "$program" eval ../listed --data ../foreign) >out 2>err && cmp listed/metrics.json before.json >>err
 report $? "scores of other data leave the run's alone, from any folder" "$(cat err out)"
 holds "scores at more than the photos' size" 2 '^error: --downscale: 0.5 (wanted 1 to 64)$' eval run --downscale 0.5
+
+mkdir shop && cp -r listed shop/run && holds "the demo leaves a run of other data alone" 2 '^error: shop/run: holds a run already ' demo -o shop --minutes 0.05 && cmp listed/model.gbt shop/run/model.gbt >out
+report $? "and its model" "$(cat out)"
+sed -i '3s|.*|../scene|' shop/run/data_places && holds "the demo trains its own run anew" 0 '^Report: shop/run/report.html$' demo -o shop --minutes 0.05 && ! cmp -s listed/model.gbt shop/run/model.gbt
+report $? "and writes its model" "$(cat err)"
 
 # ---- pictures
 "$program" render run -o shown --format exr >out 2>err && "$program" render run -o exact --renderer reference --format exr >>out 2>>err &&

@@ -45,8 +45,9 @@ gbt_export_format gbt_export_format_at(int index);
  * coordinates and axes are those of the data set; .glb has glTF's (x and y change signs).
  *
  * A trained model is baked: networks become spherical harmonics (docs/exporting.md). What that loses is
- * measured on the held-out views, for each file as it reads back, and reported. A file of a format that
- * is read, or a result folder of 3DGS, is converted.
+ * measured on up to 16 held-out views, evenly chosen (all of them for a result folder; training views where
+ * none is held out), for each file as it reads back, and reported. A file of a format that is read, or a
+ * result folder of 3DGS, is converted.
  *
  * A name that ends in / is a folder: it gets what the reference implementation of 3DGS leaves, cfg_args,
  * cameras.json, input.ply, point_cloud/iteration_N/point_cloud.ply, and of the held-out views test/ours_N/,

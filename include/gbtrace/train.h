@@ -93,10 +93,11 @@ gbt_train_def gbt_train_def_default(void);
  * Train on the data set in `data`, write everything into the folder `run`.
  *
  * `run` gets model.gbt, log.csv, config, data_places, train.json and checkpoints/. What happens meanwhile
- * goes where gbtrace/progress.h says. SIGINT and SIGTERM stop after the current step: a checkpoint is saved
- * and GBT_ERR_INTERRUPTED is returned; a signal more than a second later goes to who handled it before, which
- * mostly ends the process. The same seed and length give the same model.gbt, bit for bit, for any
- * number of threads, interrupted and resumed or not.
+ * goes where gbtrace/progress.h says. The model is a large one without scores: gbt_compress() makes it small,
+ * gbt_evaluate() makes scores, renders and the report. SIGINT and SIGTERM stop after the current step: a
+ * checkpoint is saved and GBT_ERR_INTERRUPTED is returned; a signal more than a second later goes to who
+ * handled it before, which mostly ends the process. The same seed and length give the same model.gbt, bit for
+ * bit, for any number of threads, interrupted and resumed or not.
  *
  * After gbt_cluster_open() all its processes call this together: they share the `views` of each step, the
  * first one writes the files and has the clock, and the model has the same bytes for any number of processes.

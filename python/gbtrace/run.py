@@ -25,6 +25,9 @@ def train(data, run, **settings):
     Settings have the names of RUN/config, with _ for -: train("photos", "run", iterations=2000, downscale=2). Progress goes to stderr.
     SIGINT (Ctrl-C), SIGTERM and stop_at_step save a checkpoint and raise KeyboardInterrupt. train(None, "run", resume=True, iterations=4000)
     goes on with a run, here to 4000 steps.
+
+    It leaves a large model.gbt without scores. What the program does then: `gbtrace compress RUN -o RUN/model.gbt` makes it small, evaluate()
+    makes scores, renders and the report.
     """
     lines = "".join(_setting(key.replace("_", "-"), int(value) if isinstance(value, bool) else value) for key, value in settings.items())
     lib.call("gbt_train_with", lib.optional(data), lib.encode(run), lines.encode())

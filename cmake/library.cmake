@@ -32,4 +32,3 @@ target_link_options(gbtrace_shared PRIVATE -Wl,--version-script=${CMAKE_SOURCE_D
 if(NOT GBT_SANITIZE)
   target_link_options(gbtrace_shared PRIVATE -Wl,--no-undefined)
 endif()
-add_library(gbtrace::gbtrace ALIAS gbtrace_shared)

@@ -15,6 +15,8 @@ install(FILES ${CMAKE_BINARY_DIR}/gbtraceConfigVersion.cmake DESTINATION ${packa
 
 # pkg-config gbtrace. Paths are found from the file's own place, so the tree can be moved.
 file(RELATIVE_PATH GBT_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
+cmake_path(APPEND GBT_PC_LIBDIR "\${prefix}" "${CMAKE_INSTALL_LIBDIR}") # an absolute one stands alone
+cmake_path(APPEND GBT_PC_INCLUDEDIR "\${prefix}" "${CMAKE_INSTALL_INCLUDEDIR}")
 configure_file(cmake/gbtrace.pc.in ${CMAKE_BINARY_DIR}/gbtrace.pc @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/gbtrace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
@@ -25,9 +27,7 @@ endif()
 # One package: program, library, headers, documents. What it depends on is read from the binaries.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME gbtrace)
-if(NOT CPACK_PACKAGE_CONTACT MATCHES "@")
-  set(CPACK_PACKAGE_CONTACT "gbtrace developers <developers@gbtrace.invalid>" CACHE STRING "who answers for the package: Name <mail>" FORCE)
-endif()
+set(CPACK_PACKAGE_CONTACT "gbtrace developers <developers@gbtrace.invalid>") # who answers for the package: Name <mail>
 set(CPACK_PACKAGE_DESCRIPTION "gbtrace turns posed photos into scenes that can be seen from anywhere:
 granular balls become anchors, anchors decode into Gaussians, rays through
 a tree of their ellipsoids make the picture and carry gradients back.
@@ -47,7 +47,7 @@ set(CPACK_DEBIAN_PACKAGE_VERSION ${debian_version})
 if(CMAKE_CROSSCOMPILING)
   set(CPACK_DEBIAN_PACKAGE_ARCHITECTURE arm64)
 endif()
-# The same bytes from the same sources: all files have one time, that of the release.
+# The same bytes from the same sources: all files have one time, that of the release, and permissions do not depend on the umask.
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/debian/one_time.cmake)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
@@ -64,5 +64,4 @@ execute_process(COMMAND gzip -9 -n -k -f ${CMAKE_BINARY_DIR}/debian/changelog CO
 install(SCRIPT ${CMAKE_BINARY_DIR}/debian/install.cmake)
 file(WRITE ${CMAKE_BINARY_DIR}/debian/triggers "activate-noawait ldconfig\n")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/triggers)
-set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 include(CPack)

@@ -21,7 +21,7 @@ add_library(gbtrace_shared SHARED ${library_objects})
 target_link_libraries(gbtrace_shared PRIVATE ${library_links} gbt_flags)
 foreach(library gbtrace_library gbtrace_shared)
   set_target_properties(${library} PROPERTIES OUTPUT_NAME gbtrace LINKER_LANGUAGE CXX)
-  target_include_directories(${library} PUBLIC $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+  target_include_directories(${library} PUBLIC $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 endforeach()
 
 # The soname says which programs can run with which library: include/gbtrace/version.h.
@@ -32,4 +32,3 @@ target_link_options(gbtrace_shared PRIVATE -Wl,--version-script=${CMAKE_SOURCE_D
 if(NOT GBT_SANITIZE)
   target_link_options(gbtrace_shared PRIVATE -Wl,--no-undefined)
 endif()
-add_library(gbtrace::gbtrace ALIAS gbtrace_shared)

@@ -12,6 +12,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/plain_numbers.h"
 #include "base/rng.h"
 #include "base/vec.h"
 #include "scenes/photo.h"
@@ -330,6 +331,7 @@ static gbt_status check_other_cameras(const gbt_make_scene_def *def, const char 
 
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     const recipe *r = NULL;
     if (def == NULL || folder == NULL)
         return base_fail(err, GBT_ERR_ARGUMENT, "make-scene: no %s given",

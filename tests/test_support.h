@@ -16,14 +16,13 @@
 
 #include "gbtrace/status.h"
 
-/** Fails with the library's own message. */
+/** Fails with the library's own message, where the call is given &assert_ok_err_. */
 #define assert_ok(expr)                                                                                      \
     do {                                                                                                     \
         gbt_error assert_ok_err_ = {0};                                                                      \
-        (void)assert_ok_err_;                                                                                \
         const gbt_status assert_ok_status_ = (expr);                                                         \
         if (assert_ok_status_ != GBT_OK)                                                                     \
-            fail_msg("%s: status %d", #expr, (int)assert_ok_status_);                                        \
+            fail_msg("%s: status %d: %s", #expr, (int)assert_ok_status_, assert_ok_err_.text);               \
     } while (0)
 
 /** Path of a file of the shared real data, or NULL when it is not there: then print a message and skip(). */

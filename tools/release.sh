@@ -4,8 +4,9 @@
 # Each file is made from the last commit, in the state of that commit's time, and has the same bytes whenever and wherever it is made again.
 # What cannot be made here is said at the end, in a line each.
 release() {
-    local dist=build/dist version name suite before='' missing=()
-    [ -z "$(git status --porcelain)" ] || { say "error: a release is made of a commit: there are changes that are in none (git status)"; return 1; }
+    local dist=build/dist version name suite changes before='' missing=()
+    is_repository && changes=$(git status --porcelain) || { say "error: a release is made of a commit (wanted a git repository: $top)"; return 1; }
+    [ -z "$changes" ] || { say "error: a release is made of a commit: there are changes that are in none (git status)"; return 1; }
     version=$(sed -n 's/^#define GBT_VERSION "\(.*\)"/\1/p' include/gbtrace/version.h)
     grep -q "^## \[$version\] - [0-9]" CHANGELOG.md || { say "error: CHANGELOG.md has no day of version $version"; return 1; }
     grep -q "gbtrace-$version.tar.gz" docs/packages.md || { say "error: docs/packages.md names the files of another version than $version"; return 1; }

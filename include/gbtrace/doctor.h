@@ -26,7 +26,7 @@ typedef struct gbt_diagnosis {
 } gbt_diagnosis;
 
 /**
- * Look at version, processor, threads, memory, libraries, locale, the folder to work in, and let the tracer
+ * Look at version, processor, threads, memory, libraries, the folder to work in, and let the tracer
  * and its adjoint draw a small scene beside their double references.
  *
  * @param folder [in]  where runs shall be written: may we write there, is there room

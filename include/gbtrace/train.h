@@ -107,9 +107,9 @@ gbt_train_def gbt_train_def_default(void);
  * GBT_ERR_FORMAT and one line that names the photo or the parameter. Pixels of a float photo that are not
  * finite count in no loss.
  *
- * With `resume`, `data` may be NULL: the run knows its data. Settings that differ from the run's own are
- * warned of and not taken. A run that has taken all its steps takes none; a length that it has passed is
- * GBT_ERR_ARGUMENT, other data than the run's GBT_ERR_FORMAT.
+ * With `resume`, `data` may be NULL: the run knows its data. Without, that is GBT_ERR_ARGUMENT. Settings
+ * that differ from the run's own are warned of and not taken. A run that has taken all its steps takes none;
+ * a length that it has passed is GBT_ERR_ARGUMENT, other data than the run's GBT_ERR_FORMAT.
  *
  * A folder that holds model.gbt or a checkpoint is refused with GBT_ERR_ARGUMENT before anything is written,
  * unless `resume` or `overwrite` is set. With `overwrite` the files of the older run are removed when the new

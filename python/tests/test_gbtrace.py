@@ -405,6 +405,9 @@ class Runs(unittest.TestCase):
             gbtrace.train("/nowhere", SCRATCH / "run", no_such_setting=3)
         with self.assertRaises(gbtrace.Error):
             gbtrace.train("/nowhere", SCRATCH / "run", iterations=3)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "train: no data given"):
+            gbtrace.train(None, SCRATCH / "without", iterations=3)
+        self.assertFalse((SCRATCH / "without").exists())
         for settings in ({"init": "gb\niterations = 5"}, {"init": "gb\0"}, {"init = gb\niterations": 5}):
             with self.assertRaisesRegex(ValueError, "wanted one line, without NUL"):
                 gbtrace.train("/nowhere", SCRATCH / "run", **settings)

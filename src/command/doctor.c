@@ -3,7 +3,6 @@
 #include "command/doctor.h"
 
 #include <jansson.h>
-#include <locale.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -18,6 +17,7 @@
 #include "base/image.h"
 #include "base/machine.h"
 #include "base/parallel.h"
+#include "base/plain_numbers.h"
 #include "bvh/device.h"
 #include "gbtrace/version.h"
 
@@ -125,19 +125,6 @@ static void check_libraries(gbt_diagnosis *d)
         advise(c, GBT_CHECK_FAIL, "Embree does not start: %.150s", why.text);
 }
 
-static void check_locale(gbt_diagnosis *d)
-{
-    gbt_check *c = doctor_line(d, "locale");
-    const char *point = localeconv()->decimal_point;
-    char text[16];
-    snprintf(text, sizeof text, "%.1f", 1.5);
-    snprintf(c->found, sizeof c->found, "numbers are written with \"%s\", whatever LANG and LC_ALL say",
-             point);
-    if (strcmp(point, ".") != 0 || strcmp(text, "1.5") != 0 || strtod("1.5", NULL) != 1.5)
-        advise(c, GBT_CHECK_FAIL,
-               "something called setlocale() in this process: files would be misread; start with LC_ALL=C");
-}
-
 static void check_folder(gbt_diagnosis *d, const char *folder)
 {
     gbt_check *c = doctor_line(d, "folder");
@@ -167,6 +154,7 @@ static void check_folder(gbt_diagnosis *d, const char *folder)
 
 gbt_status gbt_doctor(const char *folder, gbt_diagnosis *out, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     const machine m = machine_read("");
     *out = (gbt_diagnosis){0};
     check_version(out);
@@ -174,7 +162,6 @@ gbt_status gbt_doctor(const char *folder, gbt_diagnosis *out, gbt_error *err)
     check_threads(out, &m);
     check_memory(out, &m);
     check_libraries(out);
-    check_locale(out);
     check_folder(out, folder);
     return doctor_self_test(out, err);
 }

@@ -120,6 +120,7 @@ static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *qua
 
 gbt_status gbt_model_set_gaussians(gbt_model *m, const gbt_gaussians *g, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     if (m->run.cloud.count == 0 && m->run.model.anchors.count > 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "model: networks make its Gaussians (wanted a model of plain ones)");
@@ -211,6 +212,7 @@ gbt_model_settings gbt_model_get_settings(const gbt_model *m)
 
 gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settings, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     const gbt_model_settings *g = settings;
     for (int k = 0; k < 3; k++)
         if (!isfinite(g->background[k]))

@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "frame/plain.h"
 #include "frame/plain_view.h"
 #include "library/handle.h"
@@ -83,6 +84,7 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
 gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6],
                               const gbt_gaussians_gradient *d_gaussians, gbt_error *err)
 {
+    PLAIN_NUMBERS;
     frame *f = &m->run.frame;
     if (!m->kept)
         return base_fail(err, GBT_ERR_ARGUMENT,

@@ -287,6 +287,8 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
 static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
                                   config_strings *strings, gbt_error *err)
 {
+    if (data == NULL && !def->resume)
+        return base_fail(err, GBT_ERR_ARGUMENT, "train: no data given (wanted a data set folder, or resume)");
     run_paths paths;
     int lock = 0;
     gbt_status status = name_paths(run, &paths, err);

@@ -93,7 +93,7 @@ static inline void colmap_to_text(const char *folder)
         size_t size;
         uint64_t count;
         snprintf(path, sizeof path, "%s/%s.bin", folder, parts[i].name);
-        must(file_read(path, &f.bytes, &size, &err));
+        assert_ok(file_read(path, &f.bytes, &size, &assert_ok_err_));
         unlink(path);
         snprintf(path, sizeof path, "%s/%s.txt", folder, parts[i].name);
         f.text = fopen(path, "w");

@@ -15,15 +15,6 @@
 #include "data/raw.h"
 #include "remove_tree.h"
 
-/** Calls with a visible message on failure. */
-#define must(call)                                                                                           \
-    do {                                                                                                     \
-        gbt_error err = {0};                                                                                 \
-        const gbt_status must_status_ = (call);                                                              \
-        if (must_status_ != GBT_OK)                                                                          \
-            fail_msg("%s: status %d: %s", #call, (int)must_status_, err.text);                               \
-    } while (0)
-
 /** cmocka set-up and tear-down: *state is the path of an empty folder. */
 static inline int make_temporary(void **state)
 {
@@ -53,14 +44,14 @@ static inline void make_parent(const char *path)
 {
     char parent[4096];
     snprintf(parent, sizeof parent, "%.*s", (int)(strrchr(path, '/') - path), path);
-    must(file_make_folder(parent, &err));
+    assert_ok(file_make_folder(parent, &assert_ok_err_));
 }
 
 static inline void write_bytes(const char *folder, const char *name, const void *bytes, size_t size)
 {
     const char *path = inside(folder, name, 3);
     make_parent(path);
-    must(file_write_atomic(path, bytes, size, &err));
+    assert_ok(file_write_atomic(path, bytes, size, &assert_ok_err_));
 }
 
 static inline void write_text(const char *folder, const char *name, const char *text)
@@ -74,7 +65,7 @@ static inline void write_picture(const char *folder, const char *name, int width
     const char *path = inside(folder, name, 3);
     make_parent(path);
     image im = {0};
-    must(image_alloc(&im, width, height, 3, &err));
+    assert_ok(image_alloc(&im, width, height, 3, &assert_ok_err_));
     for (int y = 0; y < height; y++)
         for (int x = 0; x < width; x++) {
             float *pixel = im.pixels + 3 * (y * width + x);
@@ -82,7 +73,7 @@ static inline void write_picture(const char *folder, const char *name, int width
             pixel[1] = (float)y / 255;
             pixel[2] = 0;
         }
-    must(image_write(path, &im, &err));
+    assert_ok(image_write(path, &im, &assert_ok_err_));
     image_free(&im);
 }
 

@@ -15,7 +15,7 @@ static inline float between(uint64_t stream, uint64_t index, float low, float hi
 
 static inline void make_cloud(gaussian_cloud *c, size_t count, int degree)
 {
-    must(gaussian_cloud_alloc(c, count, &err));
+    assert_ok(gaussian_cloud_alloc(c, count, &assert_ok_err_));
     c->sh_degree = degree;
     for (size_t i = 0; i < count; i++) {
         float square = 0;
@@ -68,7 +68,7 @@ static inline void check_near(const gaussian_cloud *a, const gaussian_cloud *b, 
 static inline void match_order(const gaussian_cloud *a, gaussian_cloud *b, const double origin[3])
 {
     gaussian_cloud out;
-    must(gaussian_cloud_alloc(&out, a->count, &err));
+    assert_ok(gaussian_cloud_alloc(&out, a->count, &assert_ok_err_));
     assert_int_equal(a->count, b->count);
     unsigned char *taken = calloc(a->count, 1);
     for (size_t j = 0; j < b->count; j++) {

@@ -64,7 +64,7 @@ static void newest_iteration(void **state)
     char text[1024];
     result_folder found;
     bool is_there;
-    must(result_folder_find(folder, &found, &is_there, &err));
+    assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
     assert_false(is_there || gaussian_file_readable(folder));
     static const int iterations[] = {7000, 30000, 900};
     for (int i = 0; i < 3; i++) {
@@ -75,7 +75,7 @@ static void newest_iteration(void **state)
     }
     write_text(folder, "point_cloud/iteration_99999x", "");
     write_text(folder, "cfg_args", "Namespace(sh_degree=3, source_path='/data/a b', white_background=True)");
-    must(result_folder_find(folder, &found, &is_there, &err));
+    assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
     assert_true(is_there && found.iteration == 30000 && found.white_background);
     assert_string_equal(found.source, "/data/a b");
     assert_true(found.downscale == 0);
@@ -85,12 +85,12 @@ static void newest_iteration(void **state)
     static const int widths[] = {0, 0, 1200, 0};
     for (int i = 0; i < 4; i++) {
         write_text(folder, "cfg_args", resolutions[i]);
-        must(result_folder_find(folder, &found, &is_there, &err));
+        assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
         assert_true(found.downscale == downscales[i] && found.width == widths[i]);
     }
     assert_true(gaussian_file_readable(folder) && gaussian_file_has_gaussians(folder));
     gaussian_cloud cloud;
-    must(gaussian_file_read(folder, &cloud, &err));
+    assert_ok(gaussian_file_read(folder, &cloud, &assert_ok_err_));
     assert_true(cloud.count == 1 && cloud.mean[0] == 30000);
     gaussian_cloud_free(&cloud);
     write_text(folder, "model.gbt", "");

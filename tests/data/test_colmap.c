@@ -82,7 +82,7 @@ static void good_model(void **state)
     build_seed(seed);
     const colmap_files files = files_of(seed);
     raw_scene raw = {0};
-    must(colmap_bin_read(&files, &raw, &err));
+    assert_ok(colmap_bin_read(&files, &raw, &assert_ok_err_));
     check_raw(&raw);
     assert_int_equal(raw.view_count, 2);
     assert_string_equal(raw.views[0].name, "b.png");
@@ -436,7 +436,7 @@ static void all_models(void **state)
         files.cameras.bytes = camera.bytes;
         files.cameras.size = camera.size;
         raw_scene raw = {0};
-        must(colmap_bin_read(&files, &raw, &err));
+        assert_ok(colmap_bin_read(&files, &raw, &assert_ok_err_));
         assert_int_equal(raw.views[1].camera.model, id);
         for (int k = 0; k < count; k++)
             assert_true(raw.views[1].camera.params[k] == param_value(k));
@@ -643,7 +643,7 @@ static void very_long_line(void **state)
         .images = {"images.txt", images.bytes, images.size},
         .points = {"points3D.txt", (const unsigned char *)good_points, strlen(good_points)}};
     raw_scene raw = {0};
-    must(colmap_txt_read(&files, &raw, &err));
+    assert_ok(colmap_txt_read(&files, &raw, &assert_ok_err_));
     assert_int_equal(raw.view_count, 1);
     raw_free(&raw);
     sink_free(&images);
@@ -761,13 +761,14 @@ static void round_trip(void **state)
     scene binary, text;
     build_trip(t);
     write_trip_photos(t, folder);
-    must(colmap_write(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err));
-    must(scene_load(folder, NULL, &binary, &err));
+    assert_ok(colmap_write(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS,
+                           &assert_ok_err_));
+    assert_ok(scene_load(folder, NULL, &binary, &assert_ok_err_));
     assert_string_equal(binary.source, "colmap-bin");
     check_trip(t, &binary);
     /* The text twin says exactly the same. */
     colmap_to_text(inside(folder, "sparse/0", 0));
-    must(scene_load(folder, NULL, &text, &err));
+    assert_ok(scene_load(folder, NULL, &text, &assert_ok_err_));
     assert_string_equal(text.source, "colmap-txt");
     check_trip(t, &text);
     assert_memory_equal(binary.origin, text.origin, sizeof text.origin);
@@ -792,10 +793,10 @@ static void writer_shares_cameras(void **state)
     const char *folder = *state;
     trip *t = malloc(sizeof *t);
     build_trip(t);
-    must(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err));
+    assert_ok(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &assert_ok_err_));
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(folder, "cameras.bin", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(folder, "cameras.bin", 0), &bytes, &size, &assert_ok_err_));
     assert_int_equal(bytes[0], 2);
     assert_int_equal(size, 8 + (24 + 8 * 8) + (24 + 4 * 8));
     mem_free(bytes);
@@ -847,12 +848,12 @@ static void colmap_4_rig(void **state)
     for (int i = 0; i < 3; i++) {
         snprintf(paths[i], sizeof paths[i], "%s/tests/data/colmap4/sparse/0/%s.bin",
                  root != NULL ? root : ".", names[i]);
-        must(file_read(paths[i], &bytes[i], &files[i].size, &err));
+        assert_ok(file_read(paths[i], &bytes[i], &files[i].size, &assert_ok_err_));
         files[i].name = paths[i];
         files[i].bytes = bytes[i];
     }
     raw_scene raw = {0};
-    must(colmap_bin_read(&(colmap_files){files[0], files[1], files[2]}, &raw, &err));
+    assert_ok(colmap_bin_read(&(colmap_files){files[0], files[1], files[2]}, &raw, &assert_ok_err_));
     assert_int_equal(raw.view_count, 6);
     assert_int_equal(raw.point_count, 1);
     for (size_t i = 0; i < raw.view_count; i++) {

@@ -14,8 +14,8 @@ static void ply_keeps_everything(void **state)
         gaussian_cloud a, b;
         make_cloud(&a, 50, degree);
         const double origin[3] = {100, -200, 300};
-        must(gaussian_file_write(inside(*state, "a.ply", 0), &a, origin, &err));
-        must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
+        assert_ok(gaussian_file_write(inside(*state, "a.ply", 0), &a, origin, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "a.ply", 0), &b, &assert_ok_err_));
         assert_int_equal(b.sh_degree, degree);
         check_near(&a, &b, origin, &(limits){.mean = 2e-5, .quat = 1e-6, .opacity = 1e-6});
         gaussian_cloud_free(&a);
@@ -39,8 +39,8 @@ static void ply_says_how_it_is_drawn(void **state)
         make_cloud(&a, 3, 1);
         a.antialiased = marked == 1;
         a.near = 4.90744f * (float)marked;
-        must(gaussian_file_write(inside(*state, "a.ply", 0), &a, nowhere, &err));
-        must(gaussian_file_read(inside(*state, "a.ply", 0), &b, &err));
+        assert_ok(gaussian_file_write(inside(*state, "a.ply", 0), &a, nowhere, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "a.ply", 0), &b, &assert_ok_err_));
         assert_int_equal(b.antialiased, marked);
         assert_true(b.near == a.near);
         gaussian_cloud_free(&a);
@@ -48,7 +48,7 @@ static void ply_says_how_it_is_drawn(void **state)
     }
     write_text(*state, "b.ply", other);
     gaussian_cloud b;
-    must(gaussian_file_read(inside(*state, "b.ply", 0), &b, &err));
+    assert_ok(gaussian_file_read(inside(*state, "b.ply", 0), &b, &assert_ok_err_));
     assert_true(b.antialiased && b.near == 0);
     gaussian_cloud_free(&b);
 }
@@ -64,8 +64,8 @@ static void near_distances_are_kept(void **state)
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         for (int said = 0; said < 2; said++) {
             a.near = said == 1 ? 4.90744f : 0;
-            must(gaussian_file_write(inside(*state, names[i], 0), &a, nowhere, &err));
-            must(gaussian_file_read(inside(*state, names[i], 0), &b, &err));
+            assert_ok(gaussian_file_write(inside(*state, names[i], 0), &a, nowhere, &assert_ok_err_));
+            assert_ok(gaussian_file_read(inside(*state, names[i], 0), &b, &assert_ok_err_));
             assert_true(b.near == (i < 6 ? a.near : 0));
             gaussian_cloud_free(&b);
         }
@@ -79,8 +79,8 @@ static void spz_keeps_its_steps(void **state)
     for (int degree = 0; degree <= 3; degree++) {
         gaussian_cloud a, b;
         make_cloud(&a, 300, degree);
-        must(gaussian_file_write(inside(*state, "a.SPZ", 0), &a, nowhere, &err));
-        must(gaussian_file_read(inside(*state, "a.SPZ", 0), &b, &err));
+        assert_ok(gaussian_file_write(inside(*state, "a.SPZ", 0), &a, nowhere, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "a.SPZ", 0), &b, &assert_ok_err_));
         assert_int_equal(b.sh_degree, degree);
         check_near(&a, &b, nowhere,
                    &(limits){.mean = 0x1p-17 + 1e-6,
@@ -99,16 +99,16 @@ static void splat_scales(void **state)
 {
     gaussian_cloud a, b;
     make_cloud(&a, 3, 0);
-    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &assert_ok_err_));
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.splat", 0), &bytes, &size, &assert_ok_err_));
     const float scales[3][3] = {{1, 0, 2}, {1, -1, 2}, {0, 0, 0}};
     for (size_t i = 0; i < 3; i++)
         memcpy(bytes + 32 * i + 12, scales[i], sizeof scales[i]);
-    must(file_write_atomic(inside(*state, "a.splat", 0), bytes, size, &err));
+    assert_ok(file_write_atomic(inside(*state, "a.splat", 0), bytes, size, &assert_ok_err_));
     mem_free(bytes);
-    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    assert_ok(gaussian_file_read(inside(*state, "a.splat", 0), &b, &assert_ok_err_));
     assert_true(b.count == 2 && b.dropped == 1 && b.scales_clamped == 2);
     assert_true(b.scale_log[0] == 0 && b.scale_log[1] < -8 && fabsf(b.scale_log[2] - logf(2)) < 1e-6f);
     gaussian_cloud_free(&a);
@@ -125,8 +125,8 @@ static void splat_keeps_one_color(void **state)
             a.scale_log[3 * i + k] = -0.1f * (float)i - 0.01f * (float)k;
         a.opacity[i] = 0.95f - 0.02f * (float)i;
     }
-    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
-    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_read(inside(*state, "a.splat", 0), &b, &assert_ok_err_));
     check_near(&a, &b, nowhere,
                &(limits){.mean = 1e-9,
                          .scale = 1e-6,
@@ -137,8 +137,8 @@ static void splat_keeps_one_color(void **state)
     gaussian_cloud_free(&a);
     gaussian_cloud_free(&b);
     make_cloud(&a, 100, 0);
-    must(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &err));
-    must(gaussian_file_read(inside(*state, "a.splat", 0), &b, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.splat", 0), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_read(inside(*state, "a.splat", 0), &b, &assert_ok_err_));
     double before = INFINITY;
     for (size_t i = 0; i < b.count; i++) { /* opacity is rounded to 1 / 255 */
         const double size =
@@ -165,7 +165,7 @@ static void spz_bytes(void **state)
     a.sh[1] = -1;
     a.sh[3] = 0.25f;
     a.sh[11] = -0.5f;
-    must(gaussian_file_write(inside(*state, "one.spz", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "one.spz", 0), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     gzFile zipped = gzopen(inside(*state, "one.spz", 0), "rb");
     unsigned char got[64];
@@ -190,7 +190,8 @@ static void spz_bytes(void **state)
     for (size_t k = 0; k < sizeof want; k++)
         if (got[k] != expected[k])
             fail_msg("byte %zu: %u (wanted %u)", k, got[k], expected[k]);
-    must(gaussian_file_read(inside(*state, "one.spz", 0), &a, &err)); /* these have bytes of their own */
+    assert_ok(gaussian_file_read(inside(*state, "one.spz", 0), &a, &assert_ok_err_)); /* these have bytes of
+                                                                                         their own */
     assert_memory_equal(a.mean, mean, sizeof mean);
     assert_true(a.scale_log[1] == 0 && a.scale_log[2] == -1.5f); /* the first is raised: a needle */
     for (int k = 3; k < 12; k++)
@@ -204,8 +205,8 @@ static void glb_round_trip(void **state)
     for (int degree = 0; degree <= 3; degree++) {
         gaussian_cloud a, b;
         make_cloud(&a, 100, degree);
-        must(gaussian_file_write(inside(*state, "r.glb", 0), &a, origin, &err));
-        must(gaussian_file_read(inside(*state, "r.glb", 0), &b, &err));
+        assert_ok(gaussian_file_write(inside(*state, "r.glb", 0), &a, origin, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "r.glb", 0), &b, &assert_ok_err_));
         assert_int_equal(b.sh_degree, degree);
         for (int k = 0; k < 3; k++)
             assert_true(b.origin[k] == origin[k]);
@@ -233,10 +234,10 @@ static void glb_that_is_wrong(void **state)
         {"\"componentType\":5126", "\"componentType\":5125", "in the binary chunk"}};
     gaussian_cloud a, b;
     make_cloud(&a, 20, 1);
-    must(gaussian_file_write(inside(*state, "w.glb", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "w.glb", 0), &a, nowhere, &assert_ok_err_));
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "w.glb", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "w.glb", 0), &bytes, &size, &assert_ok_err_));
     const source_file file = {"w.glb", bytes, size};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         const size_t length = strlen(rows[r].before);
@@ -270,11 +271,11 @@ static void glb_nodes_of_others(void **state)
                 {"{\"children\":[0],\"scale\":[1,1,2]}", false}};
     gaussian_cloud a, b;
     make_cloud(&a, 5, 0);
-    must(gaussian_file_write(inside(*state, "n.glb", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "n.glb", 0), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "n.glb", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "n.glb", 0), &bytes, &size, &assert_ok_err_));
     const source_file file = {"n.glb", bytes, size};
     cursor c = {.file = &file, .at = 12};
     const size_t length = cursor_u32(&c);
@@ -310,10 +311,10 @@ static void glb_is_what_gltf_wants(void **state)
     gaussian_cloud a;
     make_cloud(&a, 33, 2);
     const double origin[3] = {691234.0625, 5334567.123, -0.1};
-    must(gaussian_file_write(inside(*state, "a.glb", 0), &a, origin, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.glb", 0), &a, origin, &assert_ok_err_));
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.glb", 0), &bytes, &size, &assert_ok_err_));
     const source_file file = {"a.glb", bytes, size};
     cursor c = {.file = &file};
     assert_int_equal(cursor_u32(&c), 0x46546C67);
@@ -390,13 +391,13 @@ static void damaged_files(void **state)
                       glb = {.read = gaussian_format_glb.read};
     gaussian_cloud a;
     make_cloud(&a, 2, 1);
-    must(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &err));
-    must(gaussian_file_write(inside(*state, "a.splat", 1), &a, nowhere, &err));
-    must(gaussian_file_write(inside(*state, "a.glb", 2), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.spz", 0), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_write(inside(*state, "a.splat", 1), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_write(inside(*state, "a.glb", 2), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     unsigned char *bytes, plain[256];
     size_t size;
-    must(file_read(inside(*state, "a.spz", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.spz", 0), &bytes, &size, &assert_ok_err_));
     mutate_all(bytes, size, try_gaussians, &spz);
     mem_free(bytes);
     gzFile zipped = gzopen(inside(*state, "a.spz", 0), "rb");
@@ -416,10 +417,10 @@ static void damaged_files(void **state)
             try_gaussians(packed, z.total_out, &spz);
             deflateEnd(&z);
         }
-    must(file_read(inside(*state, "a.splat", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.splat", 0), &bytes, &size, &assert_ok_err_));
     mutate_all(bytes, size, try_gaussians, &splat);
     mem_free(bytes);
-    must(file_read(inside(*state, "a.glb", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.glb", 0), &bytes, &size, &assert_ok_err_));
     mutate_all(bytes, size, try_gaussians, &glb);
     mem_free(bytes);
 }

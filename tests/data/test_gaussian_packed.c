@@ -15,9 +15,9 @@
 static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3],
                            gaussian_cloud *b)
 {
-    must(gaussian_file_write(path, a, origin, &err));
+    assert_ok(gaussian_file_write(path, a, origin, &assert_ok_err_));
     assert_true(gaussian_file_has_gaussians(path));
-    must(gaussian_file_read(path, b, &err));
+    assert_ok(gaussian_file_read(path, b, &assert_ok_err_));
     match_order(a, b, origin);
     assert_int_equal(b->sh_degree, a->sh_degree);
     assert_int_equal(b->antialiased, a->antialiased);
@@ -51,10 +51,10 @@ static void spz4_keeps_the_values_of_spz(void **state)
         make_cloud(&a, 300, degree);
         a.antialiased = degree % 2 == 1;
         const double origin[3] = {100, -200, 300};
-        must(gaussian_file_write(inside(*state, "a.spz", 0), &a, origin, &err));
-        must(gaussian_file_write(inside(*state, "a.v4.spz", 1), &a, origin, &err));
-        must(gaussian_file_read(inside(*state, "a.spz", 0), &three, &err));
-        must(gaussian_file_read(inside(*state, "a.v4.spz", 1), &four, &err));
+        assert_ok(gaussian_file_write(inside(*state, "a.spz", 0), &a, origin, &assert_ok_err_));
+        assert_ok(gaussian_file_write(inside(*state, "a.v4.spz", 1), &a, origin, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "a.spz", 0), &three, &assert_ok_err_));
+        assert_ok(gaussian_file_read(inside(*state, "a.v4.spz", 1), &four, &assert_ok_err_));
         assert_true(three.antialiased == a.antialiased && four.antialiased == a.antialiased);
         assert_int_equal(four.sh_degree, degree);
         check_near(&three, &four, nowhere, &(limits){.quat = 1e-7});
@@ -72,7 +72,7 @@ static void put_extension(const char *from, const char *to, unsigned char flags,
     static unsigned char plain[ROOM], zipped[ROOM];
     unsigned char *bytes;
     size_t size;
-    must(file_read(from, &bytes, &size, &err));
+    assert_ok(file_read(from, &bytes, &size, &assert_ok_err_));
     z_stream in = {.next_in = bytes, .avail_in = (uInt)size, .next_out = plain, .avail_out = ROOM - 12};
     assert_int_equal(inflateInit2(&in, 15 + 16), Z_OK);
     assert_int_equal(inflate(&in, Z_FINISH), Z_STREAM_END);
@@ -85,7 +85,7 @@ static void put_extension(const char *from, const char *to, unsigned char flags,
     assert_int_equal(deflateInit2(&out, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
     assert_int_equal(deflate(&out, Z_FINISH), Z_STREAM_END);
     zipped[out.total_out - 8] ^= damage; /* of the checksum */
-    must(file_write_atomic(to, zipped, out.total_out, &err));
+    assert_ok(file_write_atomic(to, zipped, out.total_out, &assert_ok_err_));
     inflateEnd(&in);
     deflateEnd(&out);
     mem_free(bytes);
@@ -96,10 +96,10 @@ static void spz_with_extensions(void **state)
     gaussian_cloud a, plain, more;
     make_cloud(&a, 300, 2);
     const char *from = inside(*state, "a.spz", 0), *to = inside(*state, "b.spz", 1);
-    must(gaussian_file_write(from, &a, nowhere, &err));
-    must(gaussian_file_read(from, &plain, &err));
+    assert_ok(gaussian_file_write(from, &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_read(from, &plain, &assert_ok_err_));
     put_extension(from, to, SPZ_EXTENSIONS, 0);
-    must(gaussian_file_read(to, &more, &err));
+    assert_ok(gaussian_file_read(to, &more, &assert_ok_err_));
     check_near(&plain, &more, nowhere, &(limits){.quat = 1e-7});
     gaussian_cloud_free(&more);
     put_extension(from, to, SPZ_EXTENSIONS, 1);
@@ -119,8 +119,8 @@ static void spz4_of_degree_4(void **state)
         harmonics[i] = (unsigned char)(128 + i % 72);
     spz_header header = {.version = 4, .count = 2, .degree = 4, .fraction = 12};
     gaussian_cloud c = {0};
-    must(spz_header_check(&header, "a", &err));
-    must(spz_unpack(streams, &header, &c, &err));
+    assert_ok(spz_header_check(&header, "a", &assert_ok_err_));
+    assert_ok(spz_unpack(streams, &header, &c, &assert_ok_err_));
     assert_int_equal(c.sh_degree, 3);
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 45; k++)
@@ -150,7 +150,7 @@ static void spz_tells_scales_that_it_has_not(void **state)
         make_cloud(&a, 3, 0);
         memcpy(a.scale_log + 3, rows[r / 2].scale_log, sizeof rows->scale_log);
         gbt_listen(keep_warning, said);
-        must(gaussian_file_write(inside(*state, names[r % 2], 0), &a, nowhere, &err));
+        assert_ok(gaussian_file_write(inside(*state, names[r % 2], 0), &a, nowhere, &assert_ok_err_));
         gbt_listen(NULL, NULL);
         gaussian_cloud_free(&a);
         if ((strstr(said, "larger or smaller: 1 (wanted") != NULL) != rows[r / 2].is_told)
@@ -165,11 +165,11 @@ static void spz4_bytes(void **state)
     make_cloud(&a, 300, 1);
     a.antialiased = true;
     a.mean[0] = 64;
-    must(gaussian_file_write(inside(*state, "a.v4.spz", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.v4.spz", 0), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "a.v4.spz", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.v4.spz", 0), &bytes, &size, &assert_ok_err_));
     static const unsigned char want[32] = {'N', 'G', 'S', 'P', 4, 0, 0,  0, 300 & 255, 300 >> 8,
                                            0,   0,   1,   16,  1, 6, 32, 0, 0,         0};
     assert_memory_equal(bytes, want, sizeof want);
@@ -217,8 +217,8 @@ static void sog_palette_is_exact(void **state)
         memcpy(a.sh + 48 * i, a.sh + 48 * (i % 300), 48 * sizeof(float));
     for (size_t i = 0; i < 48 * a.count; i++)
         a.sh[i] = roundf(a.sh[i] * 20) / 20;
-    must(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &err));
-    must(gaussian_file_read(inside(*state, "a.sog", 0), &b, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_read(inside(*state, "a.sog", 0), &b, &assert_ok_err_));
     uint32_t *order = gaussian_order(&a, NULL);
     for (size_t i = 0; i < a.count; i++)
         for (size_t k = 0; k < 48; k++)
@@ -243,7 +243,7 @@ static void levels_follow_the_values(void **state)
         low = fminf(low, values[i]);
         high = fmaxf(high, values[i]);
     }
-    must(palette_levels(values, COUNT, levels, &err));
+    assert_ok(palette_levels(values, COUNT, levels, &assert_ok_err_));
     const double step = ((double)high - (double)low) / 255;
     for (size_t i = 0; i < COUNT; i++) {
         const unsigned char k = palette_nearest(levels, values[i]);
@@ -257,7 +257,7 @@ static void levels_follow_the_values(void **state)
         fail_msg("%g of equal steps", error / equal);
     for (size_t i = 0; i < COUNT; i++)
         values[i] = (float)(i % 7);
-    must(palette_levels(values, COUNT, levels, &err));
+    assert_ok(palette_levels(values, COUNT, levels, &assert_ok_err_));
     for (size_t i = 0; i < COUNT; i++)
         assert_true(fabsf(levels[palette_nearest(levels, values[i])] - values[i]) < 1e-6f);
 }
@@ -273,7 +273,7 @@ static void palette_entries_are_means(void **state)
         vectors[i] = (float)rng_normal(4, i % WIDTH, i / WIDTH) * (float)(1 + i % WIDTH);
     for (size_t limit = 1; limit <= 4096; limit *= 8) {
         palette p;
-        must(palette_make(vectors, COUNT, WIDTH, limit, &p, &err));
+        assert_ok(palette_make(vectors, COUNT, WIDTH, limit, &p, &assert_ok_err_));
         assert_int_equal(p.count, limit < COUNT ? limit : COUNT);
         double error = 0;
         for (size_t e = 0; e < p.count; e++)
@@ -326,11 +326,11 @@ static void compressed_ply_bytes(void **state)
     const float quat[4] = {0.5f, -0.5f, 0.5f, -0.5f};
     memcpy(a.quat, quat, sizeof quat);
     a.opacity[0] = 0.6f;
-    must(gaussian_file_write(inside(*state, "one.compressed.ply", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "one.compressed.ply", 0), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "one.compressed.ply", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "one.compressed.ply", 0), &bytes, &size, &assert_ok_err_));
     /* w is left out; 1023 (1/2 + 1/2 c sqrt 2) of the others, which are -1/2 1/2 -1/2. */
     const uint32_t low = 150, high = 873;
     const uint32_t words[4] = {0, 0u << 30 | low << 20 | high << 10 | low, 0, 153};
@@ -354,7 +354,7 @@ static void older_compressed_ply(void **state)
         "-1 0 2 1 4 3 -5 -5 -5 -1 -1 -1\n4294967295 537395712 0 4278190335\n";
     const source_file file = {"old.ply", (const unsigned char *)text, sizeof text - 1};
     gaussian_cloud c;
-    must(gaussian_format_ply.read(&file, &c, &err));
+    assert_ok(gaussian_format_ply.read(&file, &c, &assert_ok_err_));
     const float mean[3] = {1, 4, 3};
     for (int k = 0; k < 3; k++) {
         assert_true(fabsf(c.mean[k] - mean[k]) < 1e-6f);
@@ -374,11 +374,11 @@ static void damaged_files(void **state)
         gaussian_attempts attempts = {.read = formats[f]->read};
         gaussian_cloud a;
         make_cloud(&a, 2, 1);
-        must(gaussian_file_write(inside(*state, names[f], 0), &a, nowhere, &err));
+        assert_ok(gaussian_file_write(inside(*state, names[f], 0), &a, nowhere, &assert_ok_err_));
         gaussian_cloud_free(&a);
         unsigned char *bytes;
         size_t size;
-        must(file_read(inside(*state, names[f], 0), &bytes, &size, &err));
+        assert_ok(file_read(inside(*state, names[f], 0), &bytes, &size, &assert_ok_err_));
         mutate_all(bytes, size, try_gaussians, &attempts);
         mem_free(bytes);
     }
@@ -410,7 +410,7 @@ static void usda_of_others(void **state)
 {
     (void)state;
     gaussian_cloud c;
-    must(read_text(usda, &c, &err));
+    assert_ok(read_text(usda, &c, &assert_ok_err_));
     const float mean[3] = {1, 2.5f, 3};
     assert_int_equal(c.count, 1);
     assert_int_equal(c.sh_degree, 1);
@@ -456,8 +456,8 @@ static void usd_keeps_everything(void **state)
         make_cloud(&a, 40, degree);
         const double origin[3] = {691234.0625, 5334567.123, -0.1};
         const char *const path = inside(*state, degree % 2 == 0 ? "a.usda" : "a.usdz", 0);
-        must(gaussian_file_write(path, &a, origin, &err));
-        must(gaussian_file_read(path, &b, &err));
+        assert_ok(gaussian_file_write(path, &a, origin, &assert_ok_err_));
+        assert_ok(gaussian_file_read(path, &b, &assert_ok_err_));
         assert_int_equal(b.sh_degree, degree);
         check_near(&a, &b, origin, &(limits){.mean = 1e-8, .scale = 1e-6, .quat = 1e-6});
         gaussian_cloud_free(&a);
@@ -470,11 +470,11 @@ static void usdz_is_aligned(void **state)
 {
     gaussian_cloud a;
     make_cloud(&a, 3, 0);
-    must(gaussian_file_write(inside(*state, "a.usdz", 0), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.usdz", 0), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     unsigned char *bytes;
     size_t size;
-    must(file_read(inside(*state, "a.usdz", 0), &bytes, &size, &err));
+    assert_ok(file_read(inside(*state, "a.usdz", 0), &bytes, &size, &assert_ok_err_));
     const unsigned char *text = memmem(bytes, size, "#usda 1.0", 9);
     assert_non_null(text);
     assert_int_equal((text - bytes) % 64, 0);
@@ -488,7 +488,7 @@ static void check_damage(const char *path, const gaussian_format *format, size_t
     gaussian_attempts attempts = {.read = format->read};
     unsigned char *bytes;
     size_t size;
-    must(file_read(path, &bytes, &size, &err));
+    assert_ok(file_read(path, &bytes, &size, &assert_ok_err_));
     for (size_t at = 0; at < size; at += step) {
         unsigned char *copy = exact_copy(bytes, at);
         try_gaussians(copy, at, &attempts);
@@ -505,9 +505,9 @@ static void damaged_bundles(void **state)
 {
     gaussian_cloud a;
     make_cloud(&a, 2, 1);
-    must(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &err));
-    must(gaussian_file_write(inside(*state, "a.usda", 1), &a, nowhere, &err));
-    must(gaussian_file_write(inside(*state, "a.usdz", 2), &a, nowhere, &err));
+    assert_ok(gaussian_file_write(inside(*state, "a.sog", 0), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_write(inside(*state, "a.usda", 1), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_write(inside(*state, "a.usdz", 2), &a, nowhere, &assert_ok_err_));
     gaussian_cloud_free(&a);
     check_damage(inside(*state, "a.sog", 0), &gaussian_format_sog, 13);
     check_damage(inside(*state, "a.usda", 1), &gaussian_format_usda, 5);

@@ -71,7 +71,7 @@ static void layout_of_each_degree(void **state)
         put_row(&s, "1 2 3", 3 * per_channel, "0", "-1 -2 -3", "2 0 0 0");
         put_row(&s, "4 5 6", 3 * per_channel, "2", "-1 -1 -1", "1 1 -1 1");
         gaussian_cloud cloud;
-        must(read_sink(&s, &cloud, &err));
+        assert_ok(read_sink(&s, &cloud, &assert_ok_err_));
         assert_int_equal(cloud.count, 2);
         assert_int_equal(cloud.sh_degree, degree);
         assert_int_equal(cloud.dropped + cloud.identity_rotations + cloud.scales_clamped, 0);
@@ -140,7 +140,7 @@ static void rows(void **state)
     put_row(&s, c->mean, 9, c->opacity, c->scale, c->rot);
     put_row(&s, "10 11 12", 9, "1", "0 0 0", "0 0 1 0");
     gaussian_cloud cloud;
-    must(read_sink(&s, &cloud, &err));
+    assert_ok(read_sink(&s, &cloud, &assert_ok_err_));
     assert_int_equal(cloud.count, 3 - c->dropped);
     assert_int_equal(cloud.dropped, c->dropped);
     assert_int_equal(cloud.identity_rotations, c->identity);
@@ -247,7 +247,7 @@ static const float *load_array(const char *name, size_t count, size_t per_row, u
     *owned = NULL;
     if (path == NULL)
         return NULL;
-    must(file_read(path, owned, &size, &err));
+    assert_ok(file_read(path, owned, &size, &assert_ok_err_));
     assert_true(size > count * per_row * sizeof(float));
     const float *values =
         (const float *)(*owned + size - count * per_row * sizeof(float)); /* the header is padded to 64 bytes
@@ -273,7 +273,7 @@ static void same_as_arrays(void **state)
     if (path == NULL || center == NULL || scale == NULL || quat == NULL || opacity == NULL || sh == NULL)
         skip();
     gaussian_cloud cloud;
-    must(gaussian_ply_load(path, &cloud, &err));
+    assert_ok(gaussian_ply_load(path, &cloud, &assert_ok_err_));
     assert_int_equal(cloud.count, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         const float *q = cloud.quat + 4 * i, *want = quat + 4 * i;
@@ -310,7 +310,7 @@ static void real_models(void **state)
             continue;
         found++;
         gaussian_cloud cloud;
-        must(gaussian_ply_load(path, &cloud, &err));
+        assert_ok(gaussian_ply_load(path, &cloud, &assert_ok_err_));
         assert_int_equal(cloud.count, models[i].count);
         assert_int_equal(cloud.dropped, 0);
         gaussian_cloud_free(&cloud);

@@ -54,7 +54,7 @@ static void good(void **state)
     const struct good_case *c = *state;
     const source_file file = {"m", (const unsigned char *)c->text, strlen(c->text)};
     mesh_data mesh = {0};
-    must(mesh_file_parse(&file, &mesh, &err));
+    assert_ok(mesh_file_parse(&file, &mesh, &assert_ok_err_));
     assert_int_equal(mesh.vertex_count, c->vertex_count);
     assert_int_equal(mesh.triangle_count, c->triangle_count);
     assert_memory_equal(mesh.triangles, c->triangles, 3 * c->triangle_count * sizeof *mesh.triangles);
@@ -125,7 +125,7 @@ static void files(void **state)
     mesh_data mesh;
     gbt_error why = {0};
     write_text(*state, "a.obj", V3 "f 1 2 3\n");
-    must(mesh_file_read(inside(*state, "a.obj", 0), &mesh, &err));
+    assert_ok(mesh_file_read(inside(*state, "a.obj", 0), &mesh, &assert_ok_err_));
     assert_int_equal(mesh.triangle_count, 1);
     mesh_data_free(&mesh);
     assert_int_equal(mesh_file_read(inside(*state, "none.obj", 0), &mesh, &why), GBT_ERR_IO);

@@ -247,7 +247,7 @@ static void negative_integers(void **state)
                                "x\nproperty short y\nproperty int z\nend_header\n"
                                "\xff\xfe\xff\xfd\xff\xff\xff";
     raw_scene raw = {0};
-    must(read_text(text, sizeof text - 1, &raw, &err));
+    assert_ok(read_text(text, sizeof text - 1, &raw, &assert_ok_err_));
     assert_true(raw.position[0] == -1 && raw.position[1] == -2 && raw.position[2] == -3);
     raw_free(&raw);
 }
@@ -260,7 +260,7 @@ static void colors_are_bounded(void **state)
         ASCII "element vertex 1\n" XYZ
               "property float red\nproperty float green\nproperty float blue\nend_header\n1 2 3 200 -4 nan\n";
     raw_scene raw = {0};
-    must(read_text(text, strlen(text), &raw, &err));
+    assert_ok(read_text(text, strlen(text), &raw, &assert_ok_err_));
     assert_true(raw.color[0] == 1 && raw.color[1] == 0 && raw.color[2] == 0);
     raw_free(&raw);
 }
@@ -282,10 +282,10 @@ static void written_cloud(void **state)
                              .faces = faces,
                              .comment = "made by a test"};
     const char *path = inside(*state, "cloud.ply", 0);
-    must(ply_write(path, &cloud, &err));
+    assert_ok(ply_write(path, &cloud, &assert_ok_err_));
     unsigned char *bytes;
     source_file file = {.name = path};
-    must(file_read(path, &bytes, &file.size, &err));
+    assert_ok(file_read(path, &bytes, &file.size, &assert_ok_err_));
     file.bytes = bytes;
     static const char header[] =
         "ply\nformat binary_little_endian 1.0\ncomment made by a test\nelement vertex 3\n" XYZ
@@ -295,7 +295,7 @@ static void written_cloud(void **state)
     assert_int_equal(file.size, strlen(header) + 3 * 23 + 2 * 13);
     assert_memory_equal(bytes, header, strlen(header));
     raw_scene raw = {0};
-    must(ply_read_points(&file, &raw, &err));
+    assert_ok(ply_read_points(&file, &raw, &assert_ok_err_));
     static const double levels[9] = {0, 128, 255, 0, 255, 0, 64, 0, 255};
     for (size_t i = 0; i < 9; i++) {
         assert_true(raw.position[i] == (double)position[i] + cloud.origin[i % 3]);
@@ -314,13 +314,13 @@ static void empty_cloud(void **state)
 {
     const ply_cloud cloud = {0};
     const char *path = inside(*state, "cloud.ply", 0);
-    must(ply_write(path, &cloud, &err));
+    assert_ok(ply_write(path, &cloud, &assert_ok_err_));
     unsigned char *bytes;
     source_file file = {.name = path};
-    must(file_read(path, &bytes, &file.size, &err));
+    assert_ok(file_read(path, &bytes, &file.size, &assert_ok_err_));
     file.bytes = bytes;
     raw_scene raw = {0};
-    must(ply_read_points(&file, &raw, &err));
+    assert_ok(ply_read_points(&file, &raw, &assert_ok_err_));
     assert_int_equal(raw.point_count, 0);
     raw_free(&raw);
     mem_free(bytes);

@@ -41,7 +41,7 @@ static void write_model(const char *folder, bool text, bool with_photos)
         points[i] = (colmap_point){.position = {999 + i, -i, i == 4 ? 1e9 : 0}, .color = {10, 20, 30}};
     char model[4096];
     snprintf(model, sizeof model, "%s/sparse/0", folder);
-    must(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &err));
+    assert_ok(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &assert_ok_err_));
     if (text)
         colmap_to_text(model);
 }
@@ -57,7 +57,7 @@ static void recentred(void **state)
     const char *folder = *state;
     write_model(folder, false, true);
     scene s;
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
     assert_string_equal(s.folder, folder);
     /* The median of the points; the one at 1e9 does not move it. */
@@ -96,13 +96,13 @@ static void folder_layouts(void **state)
             snprintf(to, sizeof to, "%s/%s", places[place], files[i]);
             move(folder, from, to);
         }
-        must(scene_load(folder, NULL, &s, &err));
+        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
         assert_int_equal(s.view_count, VIEW_COUNT);
         scene_free(&s);
     }
     /* Photos may lie in the folder itself. */
     move(folder, "images/v3.png", "v3.png");
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_non_null(strstr(s.views[2].path, "/v3.png"));
     assert_null(strstr(s.views[2].path, "images"));
     scene_free(&s);
@@ -116,14 +116,14 @@ static void colmap_elsewhere(void **state)
     scene s;
     write_model(folder, false, true);
     move(folder, "sparse", "colmap/sparse");
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
     assert_int_equal(s.view_count, VIEW_COUNT);
     scene_free(&s);
     write_text(folder, "transforms.json",
                "{\"fl_x\": 8, \"frames\": [{\"file_path\": \"images/v1.png\", \"transform_matrix\": "
                "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "transforms");
     scene_free(&s);
     unlink(inside(folder, "transforms.json", 0));
@@ -151,7 +151,7 @@ static void colmap_elsewhere(void **state)
         if (strstr(err.text, says[i]) == NULL)
             fail_msg("%s", err.text);
     }
-    must(scene_load(inside(folder, "a/b", 0), NULL, &s, &err));
+    assert_ok(scene_load(inside(folder, "a/b", 0), NULL, &s, &assert_ok_err_));
     scene_free(&s);
 }
 
@@ -160,18 +160,18 @@ static void binary_is_preferred(void **state)
     const char *folder = *state;
     write_model(folder, true, true);
     scene s;
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-txt");
     scene_free(&s);
     write_model(folder, false, false);
     write_text(folder, "sparse/0/rigs.bin", "ignored");
     write_text(folder, "sparse/0/frames.bin", "ignored");
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
     scene_free(&s);
     /* 29: an incomplete binary set gives way to a complete text set, but not to an incomplete one. */
     unlink(inside(folder, "sparse/0/images.bin", 0));
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-txt");
     scene_free(&s);
     unlink(inside(folder, "sparse/0/points3D.txt", 0));
@@ -196,10 +196,11 @@ static void missing_photos(void **state)
                           : i); /* a first and a later one */
         unlink(inside(folder, name, 0));
         if (i == 1)
-            must(file_make_folder(inside(folder, "images/v2.png", 0), &err)); /* a folder is not a photo */
+            assert_ok(file_make_folder(inside(folder, "images/v2.png", 0),
+                                       &assert_ok_err_)); /* a folder is not a photo */
         if (i == VIEW_COUNT)
             break;
-        must(scene_load(folder, NULL, &s, &err));
+        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
         assert_int_equal(s.photos_missing, i);
         assert_int_equal(s.view_count, VIEW_COUNT - i);
         assert_string_equal(s.views[0].name,
@@ -229,18 +230,18 @@ static void masks_are_found(void **state)
     static const char *const files[] = {"masks/v1.png.png", "masks/v2.png"};
     scene s;
     gbt_listen(keep_text, text);
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_null(s.views[0].mask_path);
     assert_null(strstr(text, "mask"));
     scene_free(&s);
     write_picture(folder, "masks/other.png", 8, 6);
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_null(s.views[0].mask_path);
     assert_non_null(strstr(text, "counted whole: 9 of 9 photos (wanted masks/NAME.png)"));
     scene_free(&s);
     for (int i = 0; i < 2; i++)
         write_picture(folder, files[i], 8, 6);
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     gbt_listen(NULL, NULL);
     assert_non_null(strstr(text, "counted whole: 7 of 9 photos"));
     for (int i = 0; i < 2; i++)
@@ -410,7 +411,7 @@ static void validation_leaves_held_out_photos_alone(void **state)
                                        .offset = offset,
                                        .validate_every = FOLDS,
                                        .validate_offset = fold};
-            must(scene_load(folder, &split, &s, &err));
+            assert_ok(scene_load(folder, &split, &s, &assert_ok_err_));
             for (size_t i = 0; i < s.view_count; i++) {
                 assert_int_not_equal(s.views[i].rank % EVERY, offset);
                 times[s.views[i].rank] += s.views[i].is_test;
@@ -433,13 +434,14 @@ static void splits(void **state)
     write_model(folder, false, true);
     scene s;
     for (int every = 2; every <= 10; every++) {
-        must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = every}, &s, &err));
+        assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = every}, &s,
+                             &assert_ok_err_));
         assert_int_equal(count_tests(&s), (VIEW_COUNT + (size_t)every - 1) / (size_t)every);
         for (size_t i = 0; i < VIEW_COUNT; i++)
             assert_int_equal(s.views[i].is_test, i % (size_t)every == 0);
         scene_free(&s);
     }
-    must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &err));
+    assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 0);
     scene_free(&s);
 
@@ -447,7 +449,7 @@ static void splits(void **state)
     snprintf(list, sizeof list, "%s/list.txt", folder);
     const scene_split by_list = {.kind = SCENE_SPLIT_LIST, .list_path = list};
     write_text(folder, "list.txt", "v9.png\r\n\nv2.png \nv9.png");
-    must(scene_load(folder, &by_list, &s, &err));
+    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 2);
     assert_true(s.views[1].is_test && s.views[8].is_test);
     scene_free(&s);
@@ -491,7 +493,8 @@ static void transforms_folder(void **state)
     write_text(folder, "transforms.json", text);
     scene s;
     for (int by_file = 0; by_file < 2; by_file++) {
-        must(scene_load(by_file == 0 ? folder : inside(folder, "transforms.json", 0), NULL, &s, &err));
+        assert_ok(scene_load(by_file == 0 ? folder : inside(folder, "transforms.json", 0), NULL, &s,
+                             &assert_ok_err_));
         assert_string_equal(s.source, "transforms");
         assert_int_equal(s.view_count, 2);
         assert_string_equal(s.views[0].name, "photos/a");
@@ -509,7 +512,7 @@ static void transforms_folder(void **state)
     char rest[1024];
     snprintf(rest, sizeof rest, "{\"w\": 8, \"h\": 6, \"fl_x\": 10, %s", strstr(text, "\"frames\""));
     write_text(folder, "transforms.json", rest);
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_true(s.origin[0] == 10 && s.origin[1] == 20 && s.origin[2] == 30);
     assert_int_equal(s.points.count, 0);
     assert_non_null(s.points.position);
@@ -550,10 +553,10 @@ static void origin_is_the_median(void **state)
                           : seed % 4 == 2 ? u * 1e11f
                                           : -fabsf(u);
         }
-        must(ply_write(inside(*state, "m.ply", 0), &(ply_cloud){.vertex_count = count, .position = position},
-                       &err));
+        assert_ok(ply_write(inside(*state, "m.ply", 0),
+                            &(ply_cloud){.vertex_count = count, .position = position}, &assert_ok_err_));
         scene s;
-        must(scene_load(inside(*state, "m.ply", 0), NULL, &s, &err));
+        assert_ok(scene_load(inside(*state, "m.ply", 0), NULL, &s, &assert_ok_err_));
         assert_string_equal(s.source, "ply");
         assert_int_equal(s.view_count, 0);
         for (size_t k = 0; k < 3; k++) {
@@ -647,10 +650,10 @@ static void resize_is_the_area_mean(void **state)
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
         const int *n = sizes[i];
         image in, out;
-        must(image_alloc(&in, n[0], n[1], 3, &err));
+        assert_ok(image_alloc(&in, n[0], n[1], 3, &assert_ok_err_));
         for (int k = 0; k < 3 * n[0] * n[1]; k++)
             in.pixels[k] = rng_uniform(i, 1, (uint64_t)k);
-        must(photo_resize(&in, n[2], n[3], &out, &err));
+        assert_ok(photo_resize(&in, n[2], n[3], &out, &assert_ok_err_));
         assert_int_equal(out.width, n[2]);
         assert_int_equal(out.height, n[3]);
         for (int y = 0; y < n[3]; y++)
@@ -666,7 +669,7 @@ static void resize_is_the_area_mean(void **state)
         for (int k = 0; k < 3 * n[0] * n[1]; k++)
             in.pixels[k] = 0.6f;
         image_free(&out);
-        must(photo_resize(&in, n[2], n[3], &out, &err));
+        assert_ok(photo_resize(&in, n[2], n[3], &out, &assert_ok_err_));
         for (int k = 0; k < 3 * n[2] * n[3]; k++)
             assert_true(out.pixels[k] == 0.6f);
         image_free(&in);
@@ -690,7 +693,7 @@ static void blender_folder(void **state)
         snprintf(name, sizeof name, "transforms_%s.json", sets[i]);
         snprintf(text, sizeof text, form, sets[i], i);
         write_text(folder, name, text);
-        must(scene_load(folder, NULL, &s, &err));
+        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
         assert_string_equal(s.source, "blender");
         assert_int_equal(s.has_split, i > 0);
         assert_int_equal(s.view_count, i == 0 ? 1 : 2);
@@ -708,11 +711,11 @@ static void blender_folder(void **state)
         scene_free(&s);
     }
     /* Another split replaces the data set's. */
-    must(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &err));
+    assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 0);
     scene_free(&s);
     /* By its name a file is a data set like any other. */
-    must(scene_load(inside(folder, "transforms_test.json", 0), NULL, &s, &err));
+    assert_ok(scene_load(inside(folder, "transforms_test.json", 0), NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "transforms");
     assert_int_equal(s.view_count, 1);
     scene_free(&s);
@@ -751,7 +754,7 @@ static void blender_without_a_split(void **state)
             write_text(folder, "transforms_val.json", cases[i].val);
         text[0] = '\0';
         gbt_listen(keep_text, text);
-        must(scene_load(folder, NULL, &s, &err));
+        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
         gbt_listen(NULL, NULL);
         assert_int_equal(text[0] != '\0', cases[i].says[0] != '\0');
         if (strstr(text, cases[i].says) == NULL)
@@ -860,7 +863,7 @@ static void transforms_from_windows(void **state)
     } want[] = {
         {"images/a", true, true}, {"images/b.png", false, false}, {"images\\a.png.png", false, false}};
     scene s;
-    must(scene_load(folder, NULL, &s, &err));
+    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
     assert_int_equal(s.view_count, 3);
     assert_int_equal(s.points.count, 1);
     for (int i = 0; i < 3; i++) {
@@ -880,12 +883,12 @@ static void photos(void **state)
     scene_view view = {
         .name = path, .path = path, .camera = {.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6}};
     image im;
-    must(scene_read_photo(&view, 8, 6, &im, &err));
+    assert_ok(scene_read_photo(&view, 8, 6, &im, &assert_ok_err_));
     assert_int_equal(im.channels, 3);
     assert_true(fabsf(im.pixels[3 * (2 * 8 + 5)] - 5.0f / 255) < 1e-7f &&
                 fabsf(im.pixels[3 * (2 * 8 + 5) + 1] - 2.0f / 255) < 1e-7f);
     image_free(&im);
-    must(scene_read_photo(&view, 4, 3, &im, &err));
+    assert_ok(scene_read_photo(&view, 4, 3, &im, &assert_ok_err_));
     assert_true(fabsf(im.pixels[3 * (2 * 4 + 1)] - 2.5f / 255) < 1e-7f &&
                 fabsf(im.pixels[3 * (2 * 4 + 1) + 1] - 4.5f / 255) < 1e-7f);
     image_free(&im);
@@ -920,26 +923,26 @@ static void photo_alpha_and_nan(void **state)
     const char *folder = *state;
     char path[4096];
     image im;
-    must(image_alloc(&im, 2, 1, 4, &err));
+    assert_ok(image_alloc(&im, 2, 1, 4, &assert_ok_err_));
     const float pixels[8] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f};
     memcpy(im.pixels, pixels, sizeof pixels);
     snprintf(path, sizeof path, "%s/alpha.png", folder);
-    must(image_write(path, &im, &err));
+    assert_ok(image_write(path, &im, &assert_ok_err_));
     image_free(&im);
     scene_view view = {.name = path, .path = path, .camera = {.width = 2, .height = 1}};
-    must(scene_read_photo(&view, 2, 1, &im, &err));
+    assert_ok(scene_read_photo(&view, 2, 1, &im, &assert_ok_err_));
     static const float want[6] = {1, 0.6f, 0.2f, 0.4f, 0.24f, 0.08f};
     assert_int_equal(im.channels, 3);
     for (int k = 0; k < 6; k++)
         assert_true(fabsf(im.pixels[k] - want[k]) < 1e-6f);
     image_free(&im);
-    must(image_alloc(&im, 2, 1, 3, &err));
+    assert_ok(image_alloc(&im, 2, 1, 3, &assert_ok_err_));
     const float poisoned[6] = {0.5f, NAN, INFINITY, 0.25f, 0.5f, 0.75f};
     memcpy(im.pixels, poisoned, sizeof poisoned);
     snprintf(path, sizeof path, "%s/nan.exr", folder);
-    must(image_write(path, &im, &err));
+    assert_ok(image_write(path, &im, &assert_ok_err_));
     image_free(&im);
-    must(scene_read_photo(&view, 2, 1, &im, &err));
+    assert_ok(scene_read_photo(&view, 2, 1, &im, &assert_ok_err_));
     static const float cleaned[6] = {0.5f, 0, 0, 0.25f, 0.5f, 0.75f};
     assert_memory_equal(im.pixels, cleaned, sizeof cleaned);
     image_free(&im);
@@ -955,13 +958,13 @@ static void alpha_of_an_exr(void **state)
                        glow = 0.5f;
     char path[2][4096];
     image im;
-    must(image_alloc(&im, 4, 1, 4, &err));
+    assert_ok(image_alloc(&im, 4, 1, 4, &assert_ok_err_));
     for (int exr = 0; exr < 2; exr++) {
         for (int i = 0; i < 16; i++)
             im.pixels[i] = exr && i % 4 < 3 ? pixels[i] * pixels[i - i % 4 + 3] : pixels[i];
         im.pixels[12] = exr ? glow : 0;
         snprintf(path[exr], sizeof path[exr], "%s/alpha.%s", folder, exr ? "exr" : "png");
-        must(image_write(path[exr], &im, &err));
+        assert_ok(image_write(path[exr], &im, &assert_ok_err_));
     }
     image_free(&im);
     for (int k = 0; k < 3; k++) {
@@ -970,7 +973,7 @@ static void alpha_of_an_exr(void **state)
         for (int exr = 0; exr < 2; exr++) {
             const scene_view view = {
                 .name = path[exr], .path = path[exr], .alpha = kinds[k], .camera = {.width = 4, .height = 1}};
-            must(scene_read_photo_valid(&view, 4, 1, &read[exr], &valid[exr], &err));
+            assert_ok(scene_read_photo_valid(&view, 4, 1, &read[exr], &valid[exr], &assert_ok_err_));
         }
         for (int i = 0; i < 4; i++) {
             const bool counts = kinds[k] != GBT_ALPHA_MASK || pixels[4 * i + 3] >= 0.5f;
@@ -996,11 +999,11 @@ static void masked_photos(void **state)
     snprintf(photo, sizeof photo, "%s/p.png", folder);
     snprintf(mask_path, sizeof mask_path, "%s/m.exr", folder);
     image im;
-    must(image_alloc(&im, 4, 2, 4, &err));
+    assert_ok(image_alloc(&im, 4, 2, 4, &assert_ok_err_));
     for (int i = 0; i < 8; i++)
         for (int c = 0; c < 4; c++)
             im.pixels[4 * i + c] = c < 3 ? 0.2f : i == 5 ? 0.4f : 1;
-    must(image_write(photo, &im, &err));
+    assert_ok(image_write(photo, &im, &assert_ok_err_));
     image_free(&im);
     static const struct {
         int width, height;
@@ -1022,10 +1025,10 @@ static void masked_photos(void **state)
         scene_view view = {
             .name = photo, .path = photo, .alpha = cases[k].alpha, .camera = {.width = 4, .height = 2}};
         if (cases[k].width > 0) {
-            must(image_alloc(&im, cases[k].width, cases[k].height, 1, &err));
+            assert_ok(image_alloc(&im, cases[k].width, cases[k].height, 1, &assert_ok_err_));
             for (int i = 0; i < cases[k].width * cases[k].height; i++)
                 im.pixels[i] = i < 8 ? cases[k].values[i] : 0;
-            must(image_write(mask_path, &im, &err));
+            assert_ok(image_write(mask_path, &im, &assert_ok_err_));
             image_free(&im);
             view.mask_path = mask_path;
         }
@@ -1072,11 +1075,11 @@ static void masks_of_any_color(void **state)
             .name = photo, .path = photo, .mask_path = mask_path, .camera = {.width = 4, .height = 1}};
         image im;
         unsigned char *valid;
-        must(image_alloc(&im, 4, 1, cases[k].channels, &err));
+        assert_ok(image_alloc(&im, 4, 1, cases[k].channels, &assert_ok_err_));
         memcpy(im.pixels, cases[k].values, 4 * (size_t)cases[k].channels * sizeof *im.pixels);
-        must(image_write(mask_path, &im, &err));
+        assert_ok(image_write(mask_path, &im, &assert_ok_err_));
         image_free(&im);
-        must(scene_read_photo_valid(&view, 4, 1, &im, &valid, &err));
+        assert_ok(scene_read_photo_valid(&view, 4, 1, &im, &valid, &assert_ok_err_));
         for (unsigned i = 0; i < 4; i++)
             if (valid[i] != (cases[k].valid >> i & 1))
                 fail_msg("case %zu, pixel %u", k, i);
@@ -1108,7 +1111,7 @@ static void real_data(void **state)
     if (path == NULL)
         skip();
     scene s;
-    must(scene_load(path, NULL, &s, &err));
+    assert_ok(scene_load(path, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, c->source);
     assert_int_equal(s.view_count, c->views);
     assert_int_equal(count_tests(&s), c->tests);
@@ -1136,7 +1139,7 @@ static void real_data(void **state)
         fail_msg("%s: only %zu of %zu points are seen", c->path, seen, looked_at);
     if (s.view_count > 0) {
         image im;
-        must(scene_read_photo(&s.views[0], c->width / 4, c->height / 4, &im, &err));
+        assert_ok(scene_read_photo(&s.views[0], c->width / 4, c->height / 4, &im, &assert_ok_err_));
         assert_int_equal(im.width, c->width / 4);
         image_free(&im);
     }
@@ -1154,11 +1157,11 @@ static void fox_twice(void **state)
     scene a, b;
     if (path == NULL)
         skip();
-    must(scene_load(path, NULL, &a, &err));
+    assert_ok(scene_load(path, NULL, &a, &assert_ok_err_));
     path = shared_path("data/fox_transforms");
     if (path == NULL)
         skip();
-    must(scene_load(path, NULL, &b, &err));
+    assert_ok(scene_load(path, NULL, &b, &assert_ok_err_));
     size_t compared = 0;
     double worst = 0;
     for (size_t i = 0; i < b.view_count; i++) {

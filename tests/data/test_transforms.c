@@ -294,7 +294,7 @@ static void lenses(void **state)
                 c->keys);
         raw_scene raw = {0};
         char *points_name = NULL;
-        must(read_json(text, strlen(text), &raw, &points_name, &err));
+        assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
         const gbt_camera *camera = &raw.views[0].camera;
         assert_int_equal(camera->model, c->model);
         assert_int_equal(camera->width, 8);
@@ -312,7 +312,7 @@ static void axes(void **state)
     static const char text[] = SIZED FRAMES;
     raw_scene raw = {0};
     char *points_name = NULL;
-    must(read_json(text, strlen(text), &raw, &points_name, &err));
+    assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
     static const double rotation[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1}, center[3] = {1, 2, 3};
     for (int k = 0; k < 9; k++)
         assert_true(raw.views[0].camera.rotation[k] == rotation[k]);
@@ -330,7 +330,7 @@ static void turned_axes(void **state)
               "[[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, 6], [0.48, 0.64, 0.6, 7], [0, 0, 0, 1]]}]}";
     raw_scene raw = {0};
     char *points_name = NULL;
-    must(read_json(text, strlen(text), &raw, &points_name, &err));
+    assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
     const double *r = raw.views[0].camera.rotation;
     const double right[3] = {0.36, -0.8, 0.48}, down[3] = {-0.48, -0.6, -0.64}, forward[3] = {0.8, 0, -0.6};
     for (int k = 0; k < 3; k++) {
@@ -368,7 +368,7 @@ static void rolling_shutters(void **state)
                      in_frame ? "," : "");
             raw_scene raw = {0};
             char *points_name = NULL;
-            must(read_json(text, strlen(text), &raw, &points_name, &err));
+            assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
             const gbt_camera *camera = &raw.views[0].camera;
             assert_int_equal(camera->shutter, rows[i].kind);
             for (int k = 0; k <= 4; k++) {
@@ -389,7 +389,7 @@ static void rolling_shutters(void **state)
     for (int i = 0; i < 2; i++) {
         raw_scene raw = {0};
         char *points_name = NULL;
-        must(read_json(still[i], strlen(still[i]), &raw, &points_name, &err));
+        assert_ok(read_json(still[i], strlen(still[i]), &raw, &points_name, &assert_ok_err_));
         const gbt_camera at = gbt_camera_at(&raw.views[0].camera, 0, 6);
         assert_near(at.center[0], 1, 1e-15);
         assert_near(at.rotation[0], 1, 1e-15);
@@ -405,7 +405,7 @@ static void missing_frames_are_counted(void **state)
               "}, {\"file_path\": \"d\", " POSE "}]}";
     raw_scene raw = {0};
     char *points_name = NULL;
-    must(read_json(text, strlen(text), &raw, &points_name, &err));
+    assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
     assert_int_equal(raw.view_count, 1);
     assert_int_equal(raw.photos_missing, 2);
     assert_string_equal(points_name, "p.ply");

@@ -7,6 +7,8 @@
 # of a training, --resume to the same bits as without.
 set -u
 here=$(cd "$(dirname "$0")" && pwd)
+names="$(sed -n 's/^try \([a-z-]*\) .*/\1/p' "$here/faults.sh" | tr '\n' ' ')outside"
+[ -z "${4:-}" ] || [[ " $names " = *" $4 "* ]] || { echo "error: $4: no such command (wanted one of: $names)" >&2; exit 2; }
 program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-} calls=${5:-open write fsync close rename mkdir find look read memory library}
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT

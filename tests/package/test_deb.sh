@@ -11,7 +11,9 @@ for tool in dpkg-deb dpkg-shlibdeps; do
     command -v "$tool" >/dev/null 2>&1 || give_up "$tool is not there (Debian: dpkg-dev)"
 done
 
+umask 077
 check "cpack" cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work"
+umask 022
 deb=$(find "$work" -maxdepth 1 -name '*.deb')
 dpkg-deb -c "$deb" >"$work/contents"
 has() { awk -v wanted="$1" '$6 ~ "^\\./usr/" wanted "$" { found = 1 } END { exit !found }' "$work/contents"; }
@@ -23,6 +25,7 @@ check "pkg-config" has 'lib/.*pkgconfig/gbtrace\.pc'
 check "CMake" has 'lib/.*cmake/gbtrace/gbtraceConfig\.cmake'
 check "documents" has share/doc/gbtrace/README.md
 check "files belong to root, nobody else may write" awk '$2 != "root/root" || ($1 !~ /^l/ && substr($1, 9, 1) == "w") { print; bad = 1 } END { exit bad }' "$work/contents"
+check "everybody may read, whatever the umask" awk '(/^d/ && $1 != "drwxr-xr-x") || (/^-/ && $1 !~ /^-rw.r-.r-.$/) { print; bad = 1 } END { exit bad }' "$work/contents"
 check "nothing from this machine's folders" sh -c "! grep -v ' \./usr/' '$work/contents' | grep -q ' \./.*[^/]$'"
 dpkg-deb -I "$deb" >"$work/info"
 for wanted in libc6 libstdc++6 libembree libtbb12 libopenimageio libjansson4 zlib1g libzstd1 libwebp libzip libmicrohttpd libsqlite3-0; do

@@ -52,6 +52,14 @@ check "examples by pkg-config" by_pkg_config
 check "examples by CMake" by_cmake
 check "the version that pkg-config says" test "$(pkg-config --modversion gbtrace)" = "$("$prefix/bin/gbtrace" --version | sed 's/gbtrace //')"
 
+# Folders of other names: relative ones move with the tree.
+other_folders() {
+    cmake -G Ninja -S "$source" -B "$work/other" -DCMAKE_INSTALL_INCLUDEDIR=include/other -DCMAKE_INSTALL_LIBDIR=/elsewhere/lib &&
+        grep -x 'includedir=${prefix}/include/other' "$work/other/gbtrace.pc" && grep -x 'libdir=/elsewhere/lib' "$work/other/gbtrace.pc" &&
+        grep -rF 'INTERFACE_INCLUDE_DIRECTORIES "${_IMPORT_PREFIX}/include/other"' "$work/other/CMakeFiles/Export"
+}
+check "folders of other names" other_folders
+
 # They run: a scene, a short training, a picture, a pose.
 check "make-scene" "$prefix/bin/gbtrace" make-scene tabletop -o "$work/data" --width 64 --height 48 --views 12 --points 300 --samples 4
 check "example train" "$work/by_cmake/train" "$work/data" "$work/run" 150

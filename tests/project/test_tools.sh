@@ -1,6 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# tests/project/test_tools.sh -- plants offences that tools/check_layers.sh and tools/count_tests.awk must see. Usage: test_tools.sh SOURCE
+# tests/project/test_tools.sh -- plants offences that tools/check_layers.sh and tools/count_tests.awk must see; what ./run and
+# .ci/run say of wrong arguments and missing tools. Usage: test_tools.sh SOURCE
 set -u
 source=$1
 work=$(mktemp -d) || exit 1
@@ -118,6 +119,42 @@ count "a program without cases" 0 run "0 1 passed, 0 failed, 0 skipped" </dev/nu
 count "a program that skips itself" 0 "notrun skip" "0 0 passed, 0 failed, 1 skipped" </dev/null
 count "a program that was not built" 8 "notrun lost" "1 0 passed, 1 failed, 0 skipped" </dev/null
 count "ctest failed and nobody says why" 8 run "1 1 passed, 1 failed, 0 skipped" </dev/null
+
+# ./run where there is nothing else that it could do anything with. said: exit code and first line.
+mkdir -p "$work/alone/tools" "$work/alone/tests/fuzz/seeds/ply" "$work/alone/.ci" "$work/bin"
+cp "$source/run" "$work/alone/" && cp "$source/tools/release.sh" "$work/alone/tools/"
+for tool in bash cat dirname env grep id ls xargs; do ln -s "$(command -v $tool)" "$work/bin/"; done
+said() { # arguments of ./run
+    PATH=$work/bin "$work/alone/run" "$@" >"$work/said" 2>&1 </dev/null
+    echo "$? $(head -n 1 "$work/said")"
+}
+for verb in build test package install packages format lint fuzz sanitize coverage site release faults; do
+    check "run $verb --none" "2 error: --none: unknown argument, see ./run --help" "$(said $verb --none)"
+    check "run $verb --help" "0 usage: ./run build" "$(said $verb --help | head -c 20)"
+done
+check "run release --full" "2 error: --full: not with release (wanted nothing)" "$(said release --full)"
+check "run fuzz none" "2 error: none: no such target (wanted one of: ply)" "$(said fuzz none)"
+check "run fuzz ply 1m" "2 error: 1m: bad seconds (wanted a whole number, 1 or more)" "$(said fuzz ply 1m)"
+check "faults of no command" "error: none: no such command" "$(bash "$source/tests/faults/faults.sh" /bin/sh /bin/sh 1 none 2>&1 | head -c 28)"
+check "run format without clang-format" 77 "$(said format --check | cut -d ' ' -f 1)"
+if command -v git >/dev/null; then
+    ln -s "$(command -v git)" "$work/bin/"
+    printf '#!%s/bash\necho "$@"\n' "$work/bin" >"$work/bin/clang-format-14"
+    chmod +x "$work/bin/clang-format-14"
+    : >"$work/alone/a.c"
+    git init -q "$work" && git -C "$work" add alone/a.c
+    check "run format in another repository" "1 error: no files to look at (wanted a git repository: $work/alone)" "$(said format)"
+    git init -q "$work/alone" && git -C "$work/alone" add a.c
+    check "run format in a repository" "0 -i a.c" "$(said format)"
+fi
+
+# .ci/run with a ./run that says what it was asked for, after a line that is in the log before.
+cp "$source/.ci/run" "$work/alone/.ci/"
+printf '#!/bin/sh\n[ $1 = format ] && exit "${LAYOUT:-0}"\nprintf "%%s\\n2 passed, 0 failed, 0 skipped\\n" "$1"\n' >"$work/alone/run"
+{ echo before; bash "$work/alone/.ci/run"; } >"$work/log" 2>&1
+check "ci" "0 before test 2 passed, 0 failed, 0 skipped 5 passed, 0 failed, 0 skipped " "$? $(tr '\n' ' ' <"$work/log")"
+check "ci without clang-format" "4 passed, 0 failed, 1 skipped" "$(LAYOUT=77 bash "$work/alone/.ci/run" 2>/dev/null)"
+check "ci with a file that is laid out otherwise" "0 passed, 1 failed, 0 skipped" "$(LAYOUT=1 bash "$work/alone/.ci/run" 2>/dev/null)"
 
 printf '[  PASSED  ] %d test(s).\n' "$passed"
 [ "$failed" -eq 0 ] && exit 0

@@ -395,10 +395,12 @@ static void a_decimal_comma_changes_no_file(void **state)
         setlocale(LC_ALL, "de_DE.UTF-8") == NULL)
         skip();
     resume_ok(in_root("comma"));
+    make_tiny_scene(in_root("comma_scene"));
     setlocale(LC_ALL, "C");
     unsetenv("LOCPATH");
     assert_same_file(straight_run(), in_root("comma/model.gbt"));
     assert_same_file(in_root("straight/config"), in_root("comma/config"));
+    assert_same_file(in_root("tiny/SCENE.md"), in_root("comma_scene/SCENE.md"));
 }
 
 /* Steps take a time of their own, most of it in reading photos, and one per pixel, twice that where rays are
@@ -879,6 +881,8 @@ static void data_without_training_photos_is_refused(void **state)
     train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
     train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
+    train_fails(NULL, in_root("without"), &def, GBT_ERR_ARGUMENT, "train: no data given");
+    assert_false(file_exists(in_root("without")));
     char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
     snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
     make_tiny_scene(two_lines); /* no run could be opened again that names this */

@@ -95,24 +95,36 @@ static json_t *scores_of(const char *run)
     return metrics;
 }
 
-/* Whatever stands under the masks, the model is the same to the bit, and so are its scores, with and without
-   exposures. */
+static void remove_points(const char *folder)
+{
+    char path[PATH_SIZE + 32];
+    const uint64_t none = 0;
+    snprintf(path, sizeof path, "%s/sparse/0/points3D.bin", folder);
+    assert_ok(file_write_atomic(path, &none, sizeof none, NULL));
+}
+
+/* Whatever stands under the masks, the model is the same to the bit, and so are its scores: without and with
+   exposures, and without sparse points. */
 static void masked_pixels_have_no_say(void **state)
 {
     (void)state;
-    for (int exposure = 0; exposure < 2; exposure++) {
+    enum { EXPOSURE = 1, NO_POINTS = 2 };
+    for (int kind = 0; kind <= NO_POINTS; kind++) {
         json_t *metrics[2];
-        const char *runs[2] = {in_root("a%d", exposure), in_root("b%d", exposure)};
+        const char *runs[2] = {in_root("a%d", kind), in_root("b%d", kind)};
+        masked_scene();
+        if (kind == NO_POINTS)
+            remove_points(masked_scene());
         for (int i = 0; i < 2; i++) {
             scrambled = (float)i;
-            masked_scene();
             change_photos(masked_scene(), scramble);
             gbt_train_def def = run_def();
-            def.exposure = exposure;
+            def.exposure = kind == EXPOSURE;
+            def.iterations = kind == NO_POINTS ? 4 : STEPS;
             train_ok(masked_scene(), runs[i], &def);
             metrics[i] = scores_of(runs[i]);
         }
-        assert_same_file(in_root("a%d/model.gbt", exposure), in_root("b%d/model.gbt", exposure));
+        assert_same_file(in_root("a%d/model.gbt", kind), in_root("b%d/model.gbt", kind));
         static const char *const names[] = {"psnr", "ssim", "flip"};
         for (int k = 0; k < 3; k++) {
             const double a = json_real_value(json_object_get(metrics[0], names[k])),

@@ -19,6 +19,7 @@
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/gradient_check.h"
+#include "train/run_log.h"
 #include "train/schedule.h"
 
 /* A path that lives for the next few calls. */
@@ -347,6 +348,33 @@ static void a_bad_step_changes_nothing(void **state)
         mem_free(matrix);
         trainer_free(&t);
     }
+}
+
+static void skipped_steps_are_in_no_mean(void **state)
+{
+    (void)state;
+    const gbt_train_def def = run_def();
+    trainer t;
+    step_report r;
+    run_log log;
+    double psnr[4];
+    open_ok(&t, tiny, &def);
+    assert_ok(run_log_open(&log, &t, in_root("skipped.csv"), in_root("skipped.events"), NULL));
+    for (int i = 0; i < 4; i++) { /* bad, good, bad, good */
+        const float background = t.settings.background[0];
+        if (i % 2 == 0)
+            t.settings.background[0] = NAN;
+        step_ok(&t, &r);
+        t.settings.background[0] = background;
+        assert_int_equal(r.skipped, i % 2 == 0);
+        run_log_step(&log, &t, &r);
+        psnr[i] = r.psnr;
+    }
+    assert_true(log.all.steps == 4 && log.all.compared == 2 && isfinite(log.all.loss));
+    assert_true(fabs(log.all.psnr - (psnr[1] + psnr[3])) < 1e-9);
+    assert_true(fabs(log.psnr_smooth - (0.98 * psnr[1] + 0.02 * psnr[3])) < 1e-9);
+    run_log_close(&log);
+    trainer_free(&t);
 }
 
 static void ten_bad_steps_end_the_run(void **state)
@@ -985,6 +1013,7 @@ int main(void)
         cmocka_unit_test(a_bad_pixel_has_no_say),
         cmocka_unit_test(a_bad_gradient_is_named),
         cmocka_unit_test(a_bad_step_changes_nothing),
+        cmocka_unit_test(skipped_steps_are_in_no_mean),
         cmocka_unit_test(ten_bad_steps_end_the_run),
         cmocka_unit_test(scales_stay_in_their_range),
         cmocka_unit_test(an_empty_scene_comes_back),

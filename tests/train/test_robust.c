@@ -406,6 +406,32 @@ static void ten_bad_steps_end_the_run(void **state)
     }
 }
 
+/* When all has been read. */
+static void remove_photo(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_MESSAGE && strstr(event->text, "photos to train on") != NULL)
+        remove(context);
+}
+
+static void a_photo_that_goes_ends_the_run_saved(void **state)
+{
+    (void)state;
+    const char *folder = in_root("going"), *run = in_root("gone");
+    scene s;
+    make_tiny_scene(folder);
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    assert_true(s.views[0].is_test);
+    gbt_train_def def = run_def(); /* saves nothing on the way */
+    def.iterations = 1000000;
+    for (double at = 0.1; def.eval_at_count < GBT_TRAIN_MAX_EVALS; at *= 2)
+        def.eval_at_seconds[def.eval_at_count++] = at;
+    gbt_listen(remove_photo, s.views[0].path);
+    train_fails(folder, run, &def, GBT_ERR_IO, "; saved in ");
+    be_quiet();
+    assert_true(file_exists(joined(run, "checkpoints/last.gbt")) && file_exists(joined(run, "model.gbt")));
+    scene_free(&s);
+}
+
 /* Every place of a gradient, every value that is no good. */
 static void a_bad_gradient_is_named(void **state)
 {
@@ -1015,6 +1041,7 @@ int main(void)
         cmocka_unit_test(a_bad_step_changes_nothing),
         cmocka_unit_test(skipped_steps_are_in_no_mean),
         cmocka_unit_test(ten_bad_steps_end_the_run),
+        cmocka_unit_test(a_photo_that_goes_ends_the_run_saved),
         cmocka_unit_test(scales_stay_in_their_range),
         cmocka_unit_test(an_empty_scene_comes_back),
         cmocka_unit_test(no_offset_dies_at_the_start),

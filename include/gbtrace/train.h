@@ -104,8 +104,8 @@ gbt_train_def gbt_train_def_default(void);
  * `data`, and with `resume` `run`, must be there for all of them.
  *
  * A step whose loss or gradient is not finite changes nothing but a count; ten in a row end the run with
- * GBT_ERR_FORMAT and one line that names the photo or the parameter. Pixels of a float photo that are not
- * finite count in no loss.
+ * GBT_ERR_FORMAT and one line that names the photo or the parameter. It is saved then, and when a photo can
+ * no longer be read. Pixels of a float photo that are not finite count in no loss.
  *
  * With `resume`, `data` may be NULL: the run knows its data. Without, that is GBT_ERR_ARGUMENT. Settings
  * that differ from the run's own are warned of and not taken. A run that has taken all its steps takes none;

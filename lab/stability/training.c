@@ -8,6 +8,7 @@
 #include "anchor/decode_layout.h"
 #include "base/compare.h"
 #include "base/cpu.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -362,17 +363,9 @@ gbt_status stability_a13(stability *s)
 
 /* ---- A18: the same bits ---- */
 
-static uint64_t add_hash(uint64_t hash, const void *bytes, size_t count)
-{
-    const unsigned char *p = bytes;
-    for (size_t i = 0; i < count; i++)
-        hash = (hash ^ p[i]) * 0x100000001B3u;
-    return hash;
-}
-
 static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def *def)
 {
-    uint64_t hash = 0xCBF29CE484222325u;
+    uint64_t hash = HASH_START;
     gbt_error why = {0};
     trainer *t = mem_calloc(1, sizeof *t, "trainer", s->err);
     if (t == NULL)
@@ -382,11 +375,11 @@ static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def
         const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
         for (int i = 0; i < 3; i++)
             for (int f = 0; f < ANCHOR_FIELDS; f++)
-                hash = add_hash(hash, sets[i]->field[f],
-                                sets[i]->count * anchors_width(sets[i], f) * sizeof(float));
+                hash = hash_bytes(hash, sets[i]->field[f],
+                                  sets[i]->count * anchors_width(sets[i], f) * sizeof(float));
         const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
         for (int i = 0; i < 3; i++)
-            hash = add_hash(hash, networks[i], t->decoder.param_count * sizeof(float));
+            hash = hash_bytes(hash, networks[i], t->decoder.param_count * sizeof(float));
     }
     if (t != NULL)
         trainer_free(t);

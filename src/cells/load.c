@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/vec.h"
 #include "cells/view.h"
 #include "frame/plain.h"
 
@@ -45,14 +46,14 @@ static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, floa
     if (!(share >= 1) || !(g->scale_x[i] > 0 && g->scale_y[i] > 0 && g->scale_z[i] > 0))
         return false;
     const float k = fminf(sqrtf(2 * logf(share)), d->settings.proxy_radius) * 1.01f;
-    const float w = g->quat_w[i], x = g->quat_x[i], y = g->quat_y[i], z = g->quat_z[i];
     const float sx = k * g->scale_x[i], sy = k * g->scale_y[i], sz = k * g->scale_z[i];
-    const float m[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                           {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)},
-                           {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)}};
-    for (int a = 0; a < 3; a++)
-        half[a] =
-            sqrtf(m[a][0] * m[a][0] * sx * sx + m[a][1] * m[a][1] * sy * sy + m[a][2] * m[a][2] * sz * sz);
+    const float quat[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]};
+    float m[9];
+    quat_to_matrix(quat, m);
+    for (int a = 0; a < 3; a++) {
+        const float *row = m + 3 * a;
+        half[a] = sqrtf(row[0] * row[0] * sx * sx + row[1] * row[1] * sy * sy + row[2] * row[2] * sz * sz);
+    }
     *radius = fmaxf(sx, fmaxf(sy, sz));
     return true;
 }

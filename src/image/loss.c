@@ -13,6 +13,7 @@
    for another. */
 #include "image/metrics.h"
 
+#include <math.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <string.h>
@@ -374,6 +375,7 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
     if (pixels == 0) {
         memset(d_x->pixels, 0, all * CHANNELS * sizeof *d_x->pixels);
         out->ssim = 1;
+        out->mse = (double)NAN;
         return GBT_OK;
     }
     const double values = (double)(CHANNELS * pixels);

@@ -115,6 +115,12 @@ static double near_of(const ray_image *rays, size_t i)
     return rays->near == NULL ? 0 : (double)rays->near[i];
 }
 
+/* T where a ray's part begins. */
+static double through_of(const ray_image *rays, size_t i)
+{
+    return rays->near == NULL ? 1 : (double)rays->through[i];
+}
+
 /* Where a Gaussian that one of a packet's rays hits stands in the one order of all of them. */
 static double packet_depth(const prepared *p, const trace_settings *s, const sight *ray)
 {
@@ -239,8 +245,8 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
         sight ray;
         see(job->s, job->rays, i, &ray);
         job->status[block] = gather(job->all, job->scene->count, job->s, &ray, &list, NULL);
-        const double before = job->rays->near != NULL ? (double)job->rays->through[i] : 1;
-        const size_t n = blend(job->scene, job->s, &list, ray.dir, before, job->rgb + 3 * i, &transmittance);
+        const size_t n = blend(job->scene, job->s, &list, ray.dir, through_of(job->rays, i), job->rgb + 3 * i,
+                               &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
         if (job->blended != NULL)
@@ -310,15 +316,15 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
 /* Back to front: `behind` is the colour and `open` the transmittance of everything behind a hit, so nothing
    is divided by 1 - alpha. */
 static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
-                         const double origin[3], const double dir[3], const hit_list *list,
+                         const double origin[3], const double dir[3], const hit_list *list, double through,
                          const double d_rgb[3], double d_transmittance, double *d_gaussians)
 {
     double rgb[3], T, behind[3], open = 1;
-    const size_t blended = blend(scene, s, list, dir, 1, rgb, &T);
+    const size_t blended = blend(scene, s, list, dir, through, rgb, &T);
     sky_color_exact(&s->sky, s->background, dir, behind);
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];
-        double in_front = 1;
+        double in_front = through;
         for (size_t j = 0; j < i; j++)
             in_front *= 1 - list->hits[j].alpha;
         double d_alpha = -in_front * open * d_transmittance;
@@ -345,7 +351,7 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
         see(s, rays, i, &ray);
         status = gather(all, scene->count, s, &ray, &list, err);
         if (status == GBT_OK)
-            ray_backward(scene, all, s, ray.origin, ray.dir, &list, d_rgb + 3 * i,
+            ray_backward(scene, all, s, ray.origin, ray.dir, &list, through_of(rays, i), d_rgb + 3 * i,
                          d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians);
     }
     mem_free(list.hits);

@@ -145,6 +145,21 @@ static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_err
         paths->checkpoint);
 }
 
+/* A photo that cannot be read any longer, or steps that teach nothing: what has been learned is good. */
+static bool is_of_data(gbt_status status) { return status == GBT_ERR_FORMAT || status == GBT_ERR_IO; }
+
+/* A run that fails because of `why`: where that is of the data it ends saved. */
+static gbt_status end_failed(const trainer *t, const run_paths *paths, save_beside *saving, gbt_status status,
+                             const gbt_error *why, gbt_error *err)
+{
+    if (is_of_data(status) && t->step > 0 && cluster_leads()) {
+        save_finish(saving, NULL);
+        if (save_all(t, paths, NULL) == GBT_OK)
+            return base_fail(err, status, "%s; saved in %s", why->text, paths->checkpoint);
+    }
+    return base_fail(err, status, "%s", why->text);
+}
+
 /* Log, evaluate, save, stop: whatever is due after a step. */
 static gbt_status follow_step(trainer *t, const step_report *report, run_clock *c, const run_paths *paths,
                               run_log *log, gbt_error *err)
@@ -165,7 +180,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         const gbt_status status = evaluate_in_passing(t, log, &why);
         stop = status == GBT_ERR_INTERRUPTED; /* and saved below */
         if (status != GBT_OK && !stop)
-            return base_fail(err, status, "%s", why.text);
+            return end_failed(t, paths, c->saving, status, &why, err);
         c->paused += clock_wall() - before;
         c->next_eval++;
     }
@@ -199,9 +214,14 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *sav
             continue;
         }
         step_report report;
-        GBT_TRY(trainer_step(t, &report, err));
+        gbt_error why = {0};
+        gbt_status status = trainer_step(t, &report, &why);
+        if (status != GBT_OK) {
+            end_failed(t, paths, saving, status, &why, err);
+            return is_of_data(status) ? cluster_follow(status, err) : status; /* all know of these */
+        }
         paged_check();
-        const gbt_status status = cluster_leads() ? follow_step(t, &report, &c, paths, log, err) : GBT_OK;
+        status = cluster_leads() ? follow_step(t, &report, &c, paths, log, err) : GBT_OK;
         GBT_TRY(cluster_follow(status, err));
     }
 }

@@ -29,10 +29,10 @@ static const double row_every_seconds = 1;
     X("progress", "run/progress", "%.5f", pace_progress(&t->pace, t->step))                                  \
     X("width", "run/width", "%.0f", (double)width)                                                           \
     X("height", "run/height", "%.0f", (double)height)                                                        \
-    X("loss", "loss/all", "%.6f", s->loss / n)                                                               \
-    X("l1", "loss/l1", "%.6f", s->l1 / n)                                                                    \
-    X("ssim", "train/ssim", "%.6f", s->ssim / n)                                                             \
-    X("train_psnr", "train/psnr", "%.4f", s->psnr / n)                                                       \
+    X("loss", "loss/all", "%.6f", s->loss / compared)                                                        \
+    X("l1", "loss/l1", "%.6f", s->l1 / compared)                                                             \
+    X("ssim", "train/ssim", "%.6f", s->ssim / compared)                                                      \
+    X("train_psnr", "train/psnr", "%.4f", s->psnr / compared)                                                \
     X("test_psnr", "held_out/psnr", "%.4f", test_psnr)                                                       \
     X("anchors", "scene/anchors", "%.0f", (double)t->anchors.count)                                          \
     X("gaussians", "scene/gaussians", "%.0f", s->gaussians / n)                                              \
@@ -153,6 +153,7 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
 {
     memset(log, 0, sizeof *log);
     log->last_row_seconds = t->seconds;
+    log->psnr_smooth = (double)NAN;
     GBT_TRY(rewind_rows(log, csv_path, t->step, err));
     if (t->def.tensorboard)
         GBT_TRY(rewind_events(log, events_path, t->step, err));
@@ -169,13 +170,19 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
 
 static double seconds_of(const run_sums *s) { return s->stage[RUN_STAGE_all].wall; }
 
+/* A step that was not skipped, on photos that are not masked whole. */
+static bool compares(const step_report *r) { return !r->skipped && !isnan(r->psnr); }
+
 static void add_step(run_sums *s, const step_report *r)
 {
     s->steps++;
-    s->loss += r->loss;
-    s->l1 += r->l1;
-    s->ssim += r->ssim;
-    s->psnr += r->psnr;
+    if (compares(r)) {
+        s->compared++;
+        s->loss += r->loss;
+        s->l1 += r->l1;
+        s->ssim += r->ssim;
+        s->psnr += r->psnr;
+    }
     s->gaussians += (double)r->gaussians;
     s->visible += (double)r->visible;
     s->rays += (double)r->rays;
@@ -192,7 +199,9 @@ static void add_step(run_sums *s, const step_report *r)
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
 {
     const run_sums *s = &log->row;
-    const double n = s->steps > 0 ? (double)s->steps : (double)NAN; /* no step since the last row: no means */
+    /* No step since the last row: no means. */
+    const double n = s->steps > 0 ? (double)s->steps : (double)NAN,
+                 compared = s->compared > 0 ? (double)s->compared : (double)NAN;
     const double values[] = {
 #define X(name, tag, format, value) value,
         ROW_COLUMNS(X)
@@ -247,7 +256,9 @@ void run_log_step(run_log *log, const trainer *t, const step_report *report)
 {
     add_step(&log->row, report);
     add_step(&log->all, report);
-    log->psnr_smooth = log->all.steps == 1 ? report->psnr : 0.98 * log->psnr_smooth + 0.02 * report->psnr;
+    if (compares(report))
+        log->psnr_smooth =
+            log->all.compared == 1 ? report->psnr : 0.98 * log->psnr_smooth + 0.02 * report->psnr;
     log->last = *report;
     if (log_progress_due())
         tell_progress(log, t);

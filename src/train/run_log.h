@@ -33,7 +33,7 @@ enum {
 
 /* Sums since the last row of log.csv. */
 typedef struct run_sums {
-    uint64_t steps;
+    uint64_t steps, compared; /* compared: those that loss, l1, ssim and psnr are of */
     double loss, l1, ssim, psnr, gaussians, visible, rays, hits, blended;
     stage_time stage[RUN_STAGES];
     double wait, exchange, exchange_bytes;
@@ -45,7 +45,7 @@ typedef struct run_log {
     FILE *events; /* NULL: none */
     event_records records;
     step_report last;
-    double psnr_smooth, last_row_seconds;
+    double last_row_seconds, psnr_smooth; /* NaN before any step that compares */
     double evaluated_seconds[GBT_TRAIN_MAX_EVALS], evaluated_psnr[GBT_TRAIN_MAX_EVALS];
     uint64_t evaluated_step[GBT_TRAIN_MAX_EVALS];
     int evaluated_count;

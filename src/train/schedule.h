@@ -17,7 +17,7 @@
 enum { PACE_SEGMENTS = 20 };
 
 typedef struct pace {
-    uint64_t steps[PACE_SEGMENTS]; /* iterations of each part, >= 1 where known */
+    uint64_t steps[PACE_SEGMENTS]; /* iterations of each part, >= 0 */
     int known; /* parts decided so far; PACE_SEGMENTS from the start unless the time budget decides */
 } pace;
 

@@ -39,7 +39,7 @@ typedef struct candidate {
 typedef struct seed_view {
     gbt_camera camera;
     image photo;
-    float *gray; /* [height * width] */
+    float *gray; /* [height * width]; NaN where a pixel does not count */
     size_t neighbor[NEIGHBORS];
     size_t neighbor_count;
 } seed_view;
@@ -132,7 +132,7 @@ static bool project(const gbt_camera *camera, const double world[3], double pixe
 }
 
 /* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a
-   corner leaves the photo. */
+   corner leaves the photo, or a pixel that does not count is near. */
 static bool read_patch(const seed_view *v, const double center[2], const double du[2], const double dv[2],
                        float out[PATCH_AREA])
 {
@@ -154,6 +154,9 @@ static bool read_patch(const seed_view *v, const double center[2], const double 
             out[j * PATCH + i] =
                 (1 - fy) * ((1 - fx) * row0[x0] + fx * row0[x1]) + fy * ((1 - fx) * row1[x0] + fx * row1[x1]);
         }
+    for (int i = 0; i < PATCH_AREA; i++)
+        if (!isfinite(out[i]))
+            return false;
     return true;
 }
 
@@ -312,13 +315,15 @@ static gbt_status read_views(seeding *s, photos *source, const size_t *views, si
         while (v->camera.width > SEED_LONG_SIDE || v->camera.height > SEED_LONG_SIDE)
             v->camera = photos_camera(source, view, ++level);
         GBT_TRY(photos_get(source, view, level, &v->photo, err));
+        const unsigned char *valid = photos_valid(source, view);
         const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;
         v->gray = mem_alloc(pixels, sizeof *v->gray, "seed images", err);
         if (v->gray == NULL)
             return GBT_ERR_NO_MEMORY;
         for (size_t p = 0; p < pixels; p++) {
             const float *rgb = v->photo.pixels + 3 * p;
-            v->gray[p] = 0.299f * rgb[0] + 0.587f * rgb[1] + 0.114f * rgb[2];
+            v->gray[p] =
+                valid == NULL || valid[p] ? 0.299f * rgb[0] + 0.587f * rgb[1] + 0.114f * rgb[2] : NAN;
         }
         paged_check();
     }

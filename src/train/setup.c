@@ -216,6 +216,8 @@ static gbt_status take_length(trainer *t, gbt_error *err)
         return GBT_OK;
     }
     GBT_TRY(pace_parse(def->pace, &t->pace, err));
+    if (pace_total(&t->pace) == 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "pace: no step in all (wanted at least one)");
     if (!def->resume && def->iterations > 0 && def->iterations != pace_total(&t->pace))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "iterations: %llu (wanted the %llu of `pace` in all, or only one of the two)",

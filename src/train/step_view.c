@@ -261,7 +261,7 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     r->loss = loss.loss + loss_of_gaussians(&f->gaussians, volume_weight);
     r->l1 = loss.l1;
     r->ssim = loss.ssim;
-    r->psnr = loss.mse > 0 ? -10 * log10(loss.mse) : 100;
+    r->psnr = loss.mse <= 0 ? 100 : -10 * log10(loss.mse); /* written so that NaN stays NaN */
     v->compare_time = stage_lap(&clock);
     if (!isfinite(r->loss)) {
         r->bad = true;

@@ -23,7 +23,7 @@ typedef struct view_outcome {
     gbt_status status; /* GBT_OK, or the step cannot be made: `text` says why */
     bool bad;          /* the loss or the gradient is not finite: `text` says which */
     char text[VIEW_TEXT_SIZE];
-    double loss, l1, ssim, psnr;
+    double loss, l1, ssim, psnr;       /* psnr: NaN where no pixel counts */
     double d_exposure[AFFINE_NUMBERS]; /* dL/d(colour matrix of its photo), with exposures */
     double d_pose[POSE_NUMBERS];       /* dL/d(motion of its camera), with poses */
     double d_sky[SH_COUNT][3];         /* dL/d(background's coefficients), with a sky */

@@ -120,21 +120,28 @@ static gbt_status run_views(trainer *t, step_report *out, gbt_error *err)
     return GBT_OK;
 }
 
-/* Means over the views; the size is that of the first one. */
+/* Means over the views, of what they lose over those of which a pixel counts; the size is that of the first
+   one. */
 static void report_views(const trainer *t, step_report *out)
 {
     const view_outcome *first = &t->outcomes[0];
-    const double n = t->def.views;
+    double n = 0;
+    for (int i = 0; i < t->def.views; i++)
+        n += !isnan(t->outcomes[i].psnr);
+    if (n == 0)
+        out->loss = out->l1 = out->ssim = out->psnr = (double)NAN;
     out->width = first->width;
     out->height = first->height;
     out->level = first->level;
     out->parts = first->parts;
     for (int i = 0; i < t->def.views; i++) {
         const view_outcome *v = &t->outcomes[i];
-        out->loss += v->loss / n;
-        out->l1 += v->l1 / n;
-        out->ssim += v->ssim / n;
-        out->psnr += v->psnr / n;
+        if (!isnan(v->psnr)) {
+            out->loss += v->loss / n;
+            out->l1 += v->l1 / n;
+            out->ssim += v->ssim / n;
+            out->psnr += v->psnr / n;
+        }
         out->gaussians += v->gaussians;
         out->visible += v->visible;
         out->rays += v->rays;

@@ -20,12 +20,12 @@
 
 /** What the last step did. */
 typedef struct step_report {
-    double loss, l1, ssim, psnr;     /* means over its views, as gaussians and visible */
+    double loss, l1, ssim, psnr;     /* means over its views of which a pixel counts; NaN without any */
     int width, height, level, parts; /* of the first view */
-    size_t gaussians, visible;
-    uint64_t rays, hits, blended; /* of all views */
-    frame_times times;            /* sums over its views, as photo and compare */
-    double beside;                /* how many views ran at once, in the mean */
+    size_t gaussians, visible;       /* means over its views */
+    uint64_t rays, hits, blended;    /* of all views */
+    frame_times times;               /* sums over its views, as photo and compare */
+    double beside;                   /* how many views ran at once, in the mean */
     stage_time photo, compare, optimizer, adjust, all;
     double wait_seconds, exchange_seconds; /* until all processes had their views; in sending rows */
     uint64_t exchange_bytes;

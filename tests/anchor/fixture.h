@@ -6,6 +6,7 @@
 #include "test_support.h"
 
 #include "anchor/decode.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/rng.h"
 
@@ -56,14 +57,6 @@ static inline void field_list(const gaussians *g, float *fields[GAUSSIANS_FIELD_
 #define X(name, pad, meaning) fields[i++] = g->name;
     GAUSSIANS_FIELDS(X)
 #undef X
-}
-
-static inline uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
-{
-    const unsigned char *p = bytes;
-    for (size_t i = 0; i < count; i++)
-        hash = (hash ^ p[i]) * 0x100000001B3u;
-    return hash;
 }
 
 static inline uint64_t hash_gaussians(uint64_t hash, const gaussians *g)

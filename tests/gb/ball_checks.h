@@ -5,6 +5,7 @@
 
 #include <float.h>
 
+#include "base/hash.h"
 #include "gb/balls.h"
 #include "test_support.h"
 
@@ -76,18 +77,9 @@ static inline void check_balls(const balls *b, const float *position, const floa
     free(seen);
 }
 
-static inline uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
-{
-    const unsigned char *p = bytes;
-    for (size_t i = 0; i < count; i++)
-        hash = (hash ^ p[i]) * 0x100000001b3u;
-    return hash;
-}
-
 static inline uint64_t hash_balls(const balls *b)
 {
-    uint64_t h = 0xcbf29ce484222325u;
-    h = hash_bytes(h, b->first, (b->count + 1) * sizeof *b->first);
+    uint64_t h = hash_bytes(HASH_START, b->first, (b->count + 1) * sizeof *b->first);
     h = hash_bytes(h, b->member, b->point_count * sizeof *b->member);
     h = hash_bytes(h, b->center, 3 * b->count * sizeof *b->center);
     h = hash_bytes(h, b->radius, b->count * sizeof *b->radius);

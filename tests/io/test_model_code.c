@@ -5,6 +5,7 @@
 
 #include "anchor/decode.h"
 #include "base/file.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -253,22 +254,15 @@ static void odd_models(void **state)
 
 /* ---- the format ---- */
 
-static uint64_t hash(uint64_t h, const void *bytes, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        h = (h ^ ((const unsigned char *)bytes)[i]) * UINT64_C(0x100000001b3);
-    return h;
-}
-
 static uint64_t hash_model(const model *m)
 {
     const size_t n = m->anchors.count;
-    uint64_t h = hash(UINT64_C(0xcbf29ce484222325), m->anchors.position, n * 12);
-    h = hash(h, m->anchors.feature, n * 128);
-    h = hash(h, m->anchors.offset, n * (size_t)m->anchors.offset_count * 12);
-    h = hash(h, m->anchors.scale_log, n * 24);
-    h = hash(h, m->anchor_pixel, n * 4);
-    return hash(h, m->decoder.params, m->decoder.param_count * 4);
+    uint64_t h = hash_bytes(HASH_START, m->anchors.position, n * 12);
+    h = hash_bytes(h, m->anchors.feature, n * 128);
+    h = hash_bytes(h, m->anchors.offset, n * (size_t)m->anchors.offset_count * 12);
+    h = hash_bytes(h, m->anchors.scale_log, n * 24);
+    h = hash_bytes(h, m->anchor_pixel, n * 4);
+    return hash_bytes(h, m->decoder.params, m->decoder.param_count * 4);
 }
 
 /* Files that exist must stay readable: if these change, the format has, and needs a new number of its
@@ -288,7 +282,7 @@ static void the_format_has_not_changed(void **state)
     size_t size = 0;
     for (int part = 0; part < CODE_PARTS; part++)
         size += coded.part_bytes[part];
-    const uint64_t bytes = hash(UINT64_C(0xcbf29ce484222325), coded.bytes, size), values = hash_model(&back);
+    const uint64_t bytes = hash_bytes(HASH_START, coded.bytes, size), values = hash_model(&back);
     if (bytes != GOLDEN_BYTES || values != GOLDEN_VALUES)
         fail_msg("bytes 0x%016llx, values 0x%016llx", (unsigned long long)bytes, (unsigned long long)values);
     model_coded_free(&coded);

@@ -95,24 +95,36 @@ static json_t *scores_of(const char *run)
     return metrics;
 }
 
-/* Whatever stands under the masks, the model is the same to the bit, and so are its scores, with and without
-   exposures. */
+static void remove_points(const char *folder)
+{
+    char path[PATH_SIZE + 32];
+    const uint64_t none = 0;
+    snprintf(path, sizeof path, "%s/sparse/0/points3D.bin", folder);
+    assert_ok(file_write_atomic(path, &none, sizeof none, NULL));
+}
+
+/* Whatever stands under the masks, the model is the same to the bit, and so are its scores: without and with
+   exposures, and without sparse points. */
 static void masked_pixels_have_no_say(void **state)
 {
     (void)state;
-    for (int exposure = 0; exposure < 2; exposure++) {
+    enum { EXPOSURE = 1, NO_POINTS = 2 };
+    for (int kind = 0; kind <= NO_POINTS; kind++) {
         json_t *metrics[2];
-        const char *runs[2] = {in_root("a%d", exposure), in_root("b%d", exposure)};
+        const char *runs[2] = {in_root("a%d", kind), in_root("b%d", kind)};
+        masked_scene();
+        if (kind == NO_POINTS)
+            remove_points(masked_scene());
         for (int i = 0; i < 2; i++) {
             scrambled = (float)i;
-            masked_scene();
             change_photos(masked_scene(), scramble);
             gbt_train_def def = run_def();
-            def.exposure = exposure;
+            def.exposure = kind == EXPOSURE;
+            def.iterations = kind == NO_POINTS ? 4 : STEPS;
             train_ok(masked_scene(), runs[i], &def);
             metrics[i] = scores_of(runs[i]);
         }
-        assert_same_file(in_root("a%d/model.gbt", exposure), in_root("b%d/model.gbt", exposure));
+        assert_same_file(in_root("a%d/model.gbt", kind), in_root("b%d/model.gbt", kind));
         static const char *const names[] = {"psnr", "ssim", "flip"};
         for (int k = 0; k < 3; k++) {
             const double a = json_real_value(json_object_get(metrics[0], names[k])),
@@ -226,6 +238,40 @@ static void pixels_without_a_ray_have_no_say(void **state)
     json_decref(metrics[1]);
 }
 
+/* Of the end of a training. */
+static void keep_psnr(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_PROGRESS && strcmp(event->stage, "train") == 0)
+        *(double *)context = event->psnr;
+}
+
+/* What steps report is of photos that are not masked whole, as the second is. */
+static void assert_reports_leave_out_the_black(const char *folder)
+{
+    for (int views = 1; views <= 2; views++) {
+        gbt_train_def def = run_def();
+        trainer t;
+        step_report r;
+        int black_steps = 0;
+        def.views = views;
+        open_ok(&t, folder, &def);
+        for (int i = 0; i < STEPS; i++) {
+            int black = 0;
+            step_ok(&t, &r);
+            for (int k = 0; k < views; k++)
+                black += t.train_views[t.slots[k]] == 1;
+            black_steps += black > 0;
+            assert_false(r.skipped);
+            if (black == views)
+                assert_true(isnan(r.psnr) && isnan(r.loss));
+            else
+                assert_true(r.loss > 0 && r.psnr > 0 && r.psnr < 45);
+        }
+        assert_true(black_steps > 0);
+        trainer_free(&t);
+    }
+}
+
 /* A photo that is masked whole is no score, and no step that fails. */
 static void a_black_mask_leaves_nothing(void **state)
 {
@@ -244,7 +290,12 @@ static void a_black_mask_leaves_nothing(void **state)
     image_free(&black);
     scene_free(&s);
     gbt_train_def def = run_def();
+    double late = 0;
+    gbt_listen(keep_psnr, &late);
     train_ok(folder, in_root("black_run"), &def);
+    be_quiet();
+    assert_true(late > 0 && late < 45);
+    assert_reports_leave_out_the_black(folder);
     json_t *metrics = scores_of(in_root("black_run"));
     assert_true(json_is_null(json_object_get(json_array_get(json_object_get(metrics, "views"), 0), "psnr")));
     assert_true(json_real_value(json_object_get(metrics, "psnr")) > 5);

@@ -19,6 +19,7 @@
 #include "train/checkpoint.h"
 #include "train/config.h"
 #include "train/gradient_check.h"
+#include "train/run_log.h"
 #include "train/schedule.h"
 
 /* A path that lives for the next few calls. */
@@ -349,6 +350,33 @@ static void a_bad_step_changes_nothing(void **state)
     }
 }
 
+static void skipped_steps_are_in_no_mean(void **state)
+{
+    (void)state;
+    const gbt_train_def def = run_def();
+    trainer t;
+    step_report r;
+    run_log log;
+    double psnr[4];
+    open_ok(&t, tiny, &def);
+    assert_ok(run_log_open(&log, &t, in_root("skipped.csv"), in_root("skipped.events"), NULL));
+    for (int i = 0; i < 4; i++) { /* bad, good, bad, good */
+        const float background = t.settings.background[0];
+        if (i % 2 == 0)
+            t.settings.background[0] = NAN;
+        step_ok(&t, &r);
+        t.settings.background[0] = background;
+        assert_int_equal(r.skipped, i % 2 == 0);
+        run_log_step(&log, &t, &r);
+        psnr[i] = r.psnr;
+    }
+    assert_true(log.all.steps == 4 && log.all.compared == 2 && isfinite(log.all.loss));
+    assert_true(fabs(log.all.psnr - (psnr[1] + psnr[3])) < 1e-9);
+    assert_true(fabs(log.psnr_smooth - (0.98 * psnr[1] + 0.02 * psnr[3])) < 1e-9);
+    run_log_close(&log);
+    trainer_free(&t);
+}
+
 static void ten_bad_steps_end_the_run(void **state)
 {
     (void)state;
@@ -376,6 +404,32 @@ static void ten_bad_steps_end_the_run(void **state)
         print_message("%s\n", err.text);
         trainer_free(&t);
     }
+}
+
+/* When all has been read. */
+static void remove_photo(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_MESSAGE && strstr(event->text, "photos to train on") != NULL)
+        remove(context);
+}
+
+static void a_photo_that_goes_ends_the_run_saved(void **state)
+{
+    (void)state;
+    const char *folder = in_root("going"), *run = in_root("gone");
+    scene s;
+    make_tiny_scene(folder);
+    assert_ok(scene_load(folder, NULL, &s, NULL));
+    assert_true(s.views[0].is_test);
+    gbt_train_def def = run_def(); /* saves nothing on the way */
+    def.iterations = 1000000;
+    for (double at = 0.1; def.eval_at_count < GBT_TRAIN_MAX_EVALS; at *= 2)
+        def.eval_at_seconds[def.eval_at_count++] = at;
+    gbt_listen(remove_photo, s.views[0].path);
+    train_fails(folder, run, &def, GBT_ERR_IO, "; saved in ");
+    be_quiet();
+    assert_true(file_exists(joined(run, "checkpoints/last.gbt")) && file_exists(joined(run, "model.gbt")));
+    scene_free(&s);
 }
 
 /* Every place of a gradient, every value that is no good. */
@@ -985,7 +1039,9 @@ int main(void)
         cmocka_unit_test(a_bad_pixel_has_no_say),
         cmocka_unit_test(a_bad_gradient_is_named),
         cmocka_unit_test(a_bad_step_changes_nothing),
+        cmocka_unit_test(skipped_steps_are_in_no_mean),
         cmocka_unit_test(ten_bad_steps_end_the_run),
+        cmocka_unit_test(a_photo_that_goes_ends_the_run_saved),
         cmocka_unit_test(scales_stay_in_their_range),
         cmocka_unit_test(an_empty_scene_comes_back),
         cmocka_unit_test(no_offset_dies_at_the_start),

@@ -1221,6 +1221,8 @@ static void pace_is_read(void **state)
     def.iterations = 0;
     def.pace = "1,2";
     train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
+    def.pace = "0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0";
+    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: no step in all");
     def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
     def.iterations = 209;
     train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");

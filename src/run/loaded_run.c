@@ -93,8 +93,7 @@ static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *fo
         memcpy(out, folder.ply, RESULT_PATH_SIZE);
         return GBT_OK;
     }
-    const size_t length = strlen(run);
-    *found = length > 4 && length < RESULT_PATH_SIZE && strcasecmp(run + length - 4, ".ply") == 0;
+    *found = strlen(run) < RESULT_PATH_SIZE && file_ends_with(run, ".ply");
     snprintf(out, RESULT_PATH_SIZE, "%s", run);
     return GBT_OK;
 }

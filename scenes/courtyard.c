@@ -291,7 +291,7 @@ static void build_fountain(world *w)
     world_revolve(w, WATER, 1, upper, 2, 40);
     world_revolve(w, STONE, 0, post, sizeof post / sizeof post[0], 32);
     world_ball(w, BRONZE, 0, (const float[3]){0, 0, 3.02f}, 0.30f, 36);
-    world_torus(w, BRONZE, 0, (const float[3]){0, 0, 3.02f}, 0.46f, 0.045f, 40, 12);
+    world_torus(w, BRONZE, (const float[3]){0, 0, 3.02f}, 0.46f, 0.045f, 40, 12);
     for (int i = 0; i < 8; i++) { /* bronze spheres on the rim */
         const float angle = 0.785398f * (float)i + 0.39f;
         world_ball(w, BRONZE, 1, (const float[3]){2.14f * cosf(angle), 2.14f * sinf(angle), 0.93f}, 0.15f,
@@ -317,7 +317,7 @@ static void build(world *w)
                       .exposure = 0.8f,
                       .sky_low = {0.9f, 0.85f, 0.8f},
                       .sky_high = {0.45f, 0.62f, 0.95f}};
-    world_field(w, HILLS, 0, (const float[2]){-90, -90}, (const float[2]){90, 90}, 90, hill_height);
+    world_field(w, HILLS, (const float[2]){-90, -90}, (const float[2]){90, 90}, 90, hill_height);
     world_sheet(w, PAVING, 0, (const float[3]){-21, -21, 0}, (const float[3]){42, 0, 0},
                 (const float[3]){0, 42, 0}, 0.6f);
     world_ball(w, SKY, 0, (const float[3]){0, 0, 0}, dome_radius, 32);

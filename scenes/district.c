@@ -161,7 +161,7 @@ static void build(world *w)
                       .sky_high = {0.42f, 0.6f, 0.9f}};
     const float edge = 150;
     world_place(w, 0, 0, 0, 0);
-    world_field(w, GROUND, 0, (const float[2]){-edge, -edge}, (const float[2]){edge, edge}, 160, flat);
+    world_field(w, GROUND, (const float[2]){-edge, -edge}, (const float[2]){edge, edge}, 160, flat);
     world_ball(w, SKY, 0, (const float[3]){0, 0, 0}, dome_radius, 32);
     for (int j = 0; j < BLOCKS; j++)
         for (int i = 0; i < BLOCKS; i++)

@@ -22,7 +22,7 @@ static inline void box(world *w, int material, int variant, float x, float y, fl
 static inline void tube(world *w, int material, float ax, float ay, float az, float bx, float by, float bz,
                         float radius)
 {
-    world_tube(w, material, 0, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
+    world_tube(w, material, (const float[3]){ax, ay, az}, (const float[3]){bx, by, bz}, radius, 8);
 }
 
 #endif

@@ -206,8 +206,8 @@ void world_blob(world *w, int material, int variant, const float center[3], floa
         smooth_normals(w, first, first_triangle);
 }
 
-void world_torus(world *w, int material, int variant, const float center[3], float ring_radius,
-                 float tube_radius, int segments, int sides)
+void world_torus(world *w, int material, const float center[3], float ring_radius, float tube_radius,
+                 int segments, int sides)
 {
     float profile[MAX_PROFILE][2];
     if (sides > MAX_PROFILE - 1)
@@ -224,12 +224,11 @@ void world_torus(world *w, int material, int variant, const float center[3], flo
     const float c = cosf(keep[3]), s = sinf(keep[3]);
     world_place(w, keep[0] + c * center[0] - s * center[1], keep[1] + s * center[0] + c * center[1],
                 keep[2] + center[2], keep[3]);
-    world_revolve(w, material, variant, (const float(*)[2])profile, sides + 1, segments);
+    world_revolve(w, material, 0, (const float(*)[2])profile, sides + 1, segments);
     memcpy(w->place, keep, sizeof keep);
 }
 
-void world_tube(world *w, int material, int variant, const float a[3], const float b[3], float radius,
-                int sides)
+void world_tube(world *w, int material, const float a[3], const float b[3], float radius, int sides)
 {
     float axis[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
     const float length = sqrtf(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
@@ -259,10 +258,10 @@ void world_tube(world *w, int material, int variant, const float a[3], const flo
             const float p[3] = {from[0] + radius * n[0], from[1] + radius * n[1], from[2] + radius * n[2]};
             world_vertex(w, p, n, (float)i / (float)sides, end == 0 ? 0 : length);
         }
-    stitch(w, material, variant, first, sides, 1);
+    stitch(w, material, 0, first, sides, 1);
 }
 
-void world_field(world *w, int material, int variant, const float low[2], const float high[2], int cells,
+void world_field(world *w, int material, const float low[2], const float high[2], int cells,
                  height_fn *height)
 {
     const uint32_t first = (uint32_t)w->vertex_count;
@@ -275,5 +274,5 @@ void world_field(world *w, int material, int variant, const float low[2], const 
                                      (height(x, y - step_y) - height(x, y + step_y)) / (2 * step_y), 1};
             world_vertex(w, p, normal, x, y);
         }
-    stitch(w, material, variant, first, cells, cells);
+    stitch(w, material, 0, first, cells, cells);
 }

@@ -102,7 +102,7 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
     }
     if (-(dir[0] * normal[0] + dir[1] * normal[1] + dir[2] * normal[2]) < least_cosine)
         return false;
-    return !mesh_tree_blocked(q->w->tree, origin, dir, 0, (float)(distance * (1 - 1e-4)) - q->w->epsilon);
+    return !mesh_tree_blocked(q->w->tree, origin, dir, (float)(distance * (1 - 1e-4)) - q->w->epsilon);
 }
 
 static void find_tracks(size_t block, size_t begin, size_t end, void *context)

@@ -462,7 +462,7 @@ static void build_table(world *w)
     box(w, LETTER_BLOCK, 2, 0, 0, 0.228f, 0.075f, 0.075f, 0.075f, 0.04f);
 
     world_place(w, 0.36f, -0.24f, top, 0);
-    world_torus(w, CERAMIC, 0, (const float[3]){0, 0, 0.056f}, 0.12f, 0.052f, 56, 24);
+    world_torus(w, CERAMIC, (const float[3]){0, 0, 0.056f}, 0.12f, 0.052f, 56, 24);
     world_place(w, 0.60f, -0.08f, top, 0);
     world_ball(w, CERAMIC, 1, (const float[3]){0, 0, 0.088f}, 0.085f, 40);
 

@@ -132,7 +132,7 @@ static void build_tree(world *w, int number, float x, float y)
 {
     const float high = 0.9f + 0.7f * texture_hash(number, 3, 7);
     world_place(w, x, y, ground_height(x, y), (float)number);
-    world_tube(w, TRUNK, 0, (const float[3]){0, 0, -0.1f}, (const float[3]){0, 0, 0.5f * high}, 0.05f, 6);
+    world_tube(w, TRUNK, (const float[3]){0, 0, -0.1f}, (const float[3]){0, 0, 0.5f * high}, 0.05f, 6);
     if (number % 3 != 0) {
         static const float cone[][2] = {{0.0f, 0.22f},  {0.40f, 0.22f}, {0.40f, 0.22f}, {0.18f, 0.62f},
                                         {0.18f, 0.62f}, {0.29f, 0.60f}, {0.29f, 0.60f}, {0.0f, 1.15f}};
@@ -161,8 +161,8 @@ static void build(world *w)
                       .sky_low = {0.8f, 0.82f, 0.86f},
                       .sky_high = {0.42f, 0.6f, 0.9f}};
     world_place(w, 0, 0, 0, 0);
-    world_field(w, GROUND, 0, (const float[2]){-half_size, -half_size},
-                (const float[2]){half_size, half_size}, 200, ground_height);
+    world_field(w, GROUND, (const float[2]){-half_size, -half_size}, (const float[2]){half_size, half_size},
+                200, ground_height);
     static const float lake[][2] = {{5.4f, -0.55f}, {2.5f, -0.55f}, {0.0f, -0.55f}};
     world_place(w, 4.6f, -3.8f, 0, 0);
     world_revolve(w, LAKE, 0, lake, 3, 32);

@@ -39,7 +39,7 @@ static void frame(const float n[3], float a[3], float b[3])
 bool world_trace(const world *w, const float origin[3], const float dir[3], surface *out)
 {
     mesh_hit hit;
-    if (!mesh_tree_trace(w->tree, origin, dir, 0, INFINITY, &hit))
+    if (!mesh_tree_trace(w->tree, origin, dir, INFINITY, &hit))
         return false;
     const uint32_t *vertex = w->triangle + 3 * (size_t)hit.triangle;
     const double u = fmin(fmax(hit.u, 0), 1), v = fmin(fmax(hit.v, 0), 1 - u);
@@ -115,7 +115,7 @@ static bool lamp_light(const world *w, const surface *s, const float jitter[2], 
     float start[3];
     for (int k = 0; k < 3; k++)
         start[k] = s->position[k] + w->epsilon * s->geometric[k];
-    if (distance > 2 * w->epsilon && mesh_tree_blocked(w->tree, start, to_lamp, 0, distance - 2 * w->epsilon))
+    if (distance > 2 * w->epsilon && mesh_tree_blocked(w->tree, start, to_lamp, distance - 2 * w->epsilon))
         return false;
     for (int k = 0; k < 3; k++)
         irradiance[k] = falloff * cosine * lamp->color[k];

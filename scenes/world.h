@@ -100,16 +100,15 @@ void world_blob(world *w, int material, int variant, const float center[3], floa
                 float amount, float detail, int segments);
 
 /** Torus about z. */
-void world_torus(world *w, int material, int variant, const float center[3], float ring_radius,
-                 float tube_radius, int segments, int sides);
+void world_torus(world *w, int material, const float center[3], float ring_radius, float tube_radius,
+                 int segments, int sides);
 
 /** Open tube from a to b; uv: angle in turns and length. */
-void world_tube(world *w, int material, int variant, const float a[3], const float b[3], float radius,
-                int sides);
+void world_tube(world *w, int material, const float a[3], const float b[3], float radius, int sides);
 
 /** Height field over [x0, x1] x [y0, y1]; uv are x and y. */
 typedef float height_fn(float x, float y);
-void world_field(world *w, int material, int variant, const float low[2], const float high[2], int cells,
+void world_field(world *w, int material, const float low[2], const float high[2], int cells,
                  height_fn *height);
 
 /** Single vertices and triangles, for the rest. */

@@ -28,13 +28,14 @@ gbt_pose_def gbt_pose_def_default(void);
  * database, settings and logs: after SIGINT, SIGTERM or a kill the same call goes on, and skips finished
  * stages. DATA/sparse appears when it is complete.
  *
- * @param source [in] a folder of PNG and JPEG photos (its sub-folders too, or those of its images/ when it
- *                    has none itself), or a film that ffmpeg reads
+ * @param source [in] a folder of PNG and JPEG photos (its sub-folders too, but for masks/; or those of its
+ *                    images/ when it has none itself), or a film that ffmpeg reads
  * @param data   [in] folder, made when it is not there; may be `source` when the photos are in its images/
  * @param report [in] open stream: what was registered, and what was not and why; NULL: none
  * @return GBT_OK; GBT_ERR_ARGUMENT (DATA holds something else, or was begun with other settings or photos);
  *         GBT_ERR_IO (no colmap or ffmpeg, or one that failed: its log is named); GBT_ERR_FORMAT (no photos,
- *         or none could be registered); GBT_ERR_INTERRUPTED; GBT_ERR_NO_MEMORY
+ *         none could be registered, or COLMAP's model is damaged: the same call makes it anew);
+ *         GBT_ERR_INTERRUPTED; GBT_ERR_NO_MEMORY
  *
  * Threads: one call at a time in a process; COLMAP uses as many threads as gbt_set_threads() says. SIGCHLD
  * must not be ignored: how a program ends is not known then, and counts as a failure.

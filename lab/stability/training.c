@@ -286,15 +286,16 @@ static const poor_case poor_cases[] = {
     {"A13P14", p14_sizes, false, false},     {"A13P15", p15_no_color, false, false},
 };
 
-static practice *poor_scene(stability *s, size_t views, double arc_deg)
+static practice *poor_scene(stability *s, size_t views)
 {
+    const double arc_deg = 120;
     return practice_make(s, (size_t)stability_number(s, "points"), views, stability_number(s, "radius"),
                          arc_deg, (int)stability_number(s, "width"), (int)stability_number(s, "height"));
 }
 
 static void try_poor(stability *s, const poor_case *c, size_t *bad)
 {
-    practice *p = poor_scene(s, (size_t)stability_number(s, "views"), 120);
+    practice *p = poor_scene(s, (size_t)stability_number(s, "views"));
     if (p != NULL)
         c->spoil(p);
     practice_write(s, p, c->row);
@@ -337,7 +338,7 @@ static double held_out(stability *s, const practice *p, bool exposure)
 static void exposures_differ(stability *s)
 {
     static const float factors[3] = {0.5f, 1, 2};
-    practice *p = poor_scene(s, 12, 120);
+    practice *p = poor_scene(s, 12);
     for (size_t i = 0; p != NULL && i < p->view_count; i++)
         p->gain[i] = 0.5f * factors[i % 3]; /* half as bright: twice that does not clip */
     practice_write(s, p, "a13p11");

@@ -7,7 +7,7 @@
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
                           study_figures *out, gbt_error *err)
 {
-    const anchors_study *s = study;
+    const grid_study *s = study;
     const anchors_variant *v = &anchors_variants[variant];
     gbt_train_def def = gbt_train_def_default();
     def.eval_split = s->def.eval_split;
@@ -23,7 +23,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
 
 gbt_status lab_study_anchors(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    anchors_study s = {.def = study_grid_def(def, 3, "auto", 1000)};
+    grid_study s = {.def = study_grid_def(def, 3, "auto", 1000)};
     if (s.def.iterations < 20)
         return base_fail(err, GBT_ERR_ARGUMENT, "--iterations: %llu (wanted at least 20)",
                          (unsigned long long)s.def.iterations);

@@ -23,16 +23,6 @@ typedef struct anchors_variant {
 extern const anchors_variant anchors_variants[];
 extern const size_t anchors_variant_count;
 
-typedef struct anchors_study {
-    lab_runs_def def; /* borrowed */
-    study_grid grid;
-} anchors_study;
-
-static inline const study_figures *anchors_run(const anchors_study *s, size_t place, size_t variant, int seed)
-{
-    return study_grid_at(&s->grid, place, variant, seed);
-}
-
 /** How it is written down. */
 extern const study_output anchors_output;
 

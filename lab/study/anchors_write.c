@@ -30,29 +30,29 @@ static double value_of(const study_figures *run, figure which)
     return values[which];
 }
 
-static stat_sample stat_over(const anchors_study *s, size_t scene, size_t variant, figure which)
+static stat_sample stat_over(const grid_study *s, size_t scene, size_t variant, figure which)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++)
-        values[seed] = value_of(anchors_run(s, scene, variant, seed), which);
+        values[seed] = value_of(study_grid_at(&s->grid, scene, variant, seed), which);
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
 /* Against another variant of the same seed: a difference, or per cent of the other. */
-static stat_sample change_over(const anchors_study *s, size_t scene, size_t variant, size_t base,
-                               figure which, bool relative)
+static stat_sample change_over(const grid_study *s, size_t scene, size_t variant, size_t base, figure which,
+                               bool relative)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
-        const double here = value_of(anchors_run(s, scene, variant, seed), which),
-                     there = value_of(anchors_run(s, scene, base, seed), which);
+        const double here = value_of(study_grid_at(&s->grid, scene, variant, seed), which),
+                     there = value_of(study_grid_at(&s->grid, scene, base, seed), which);
         values[seed] = relative ? 100 * here / there : here - there;
     }
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
 /* How many times smaller than the voxels' anchors at the paper's bytes. */
-static double times_smaller(const anchors_study *s, size_t scene, size_t variant)
+static double times_smaller(const grid_study *s, size_t scene, size_t variant)
 {
     return PAPER_BYTES_PER_ANCHOR * stat_over(s, scene, ANCHORS_VOXELS, FINAL).mean /
            stat_over(s, scene, variant, BYTES).mean;
@@ -60,7 +60,7 @@ static double times_smaller(const anchors_study *s, size_t scene, size_t variant
 
 /* ---- Markdown ---- */
 
-static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
+static void add_row(const grid_study *s, size_t scene, size_t v, text *out)
 {
     text_format(out, "| %s |", anchors_variants[v].name);
     for (int f = 0; f < FIGURES; f++) {
@@ -85,7 +85,7 @@ static void add_row(const anchors_study *s, size_t scene, size_t v, text *out)
 
 static void add_tables(const void *study, text *out)
 {
-    const anchors_study *s = study;
+    const grid_study *s = study;
     text_format(out,
                 "# Anchors against held-out PSNR\n\n%llu iterations of the default settings, photos divided "
                 "by %g, seeds 0 to %d, held-out photos: %s.\n",
@@ -116,7 +116,7 @@ static void add_tables(const void *study, text *out)
 
 static void add_csv(const void *study, text *out)
 {
-    const anchors_study *s = study;
+    const grid_study *s = study;
     text_add(out, "scene,start,seed");
     for (int f = 0; f < FIGURES; f++)
         text_format(out, ",%s", figure_texts[f].name);
@@ -124,7 +124,7 @@ static void add_csv(const void *study, text *out)
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (size_t v = 0; v < anchors_variant_count; v++)
             for (int seed = 0; seed < s->grid.seeds; seed++) {
-                const study_figures *run = anchors_run(s, scene, v, seed);
+                const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
                 stat_csv_text(out, s->grid.names[scene]);
                 text_format(out, ",\"%s\",%d", anchors_variants[v].name, seed);
                 for (int f = 0; f < FIGURES; f++)
@@ -143,7 +143,7 @@ static void add_limited(json_t *rows, const char *scene, const char *start, cons
                                     "value", json_number(value), "pass", isnan(limit) || value <= limit));
 }
 
-static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
+static void add_rows(const grid_study *s, size_t scene, json_t *rows)
 {
     for (size_t v = 1; v < anchors_variant_count; v++) {
         const char *start = anchors_variants[v].name;
@@ -161,7 +161,7 @@ static void add_rows(const anchors_study *s, size_t scene, json_t *rows)
 
 static json_t *data_of(const void *study)
 {
-    const anchors_study *s = study;
+    const grid_study *s = study;
     json_t *rows = json_array(), *runs = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         add_rows(s, scene, rows);
@@ -181,7 +181,7 @@ static json_t *data_of(const void *study)
 
 /* ---- charts ---- */
 
-static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
+static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
 {
     scatter_point points[ANCHORS_VARIANTS_MAX * STUDY_SEEDS_MAX];
     char title[STUDY_NAME_SIZE + 40];
@@ -196,7 +196,7 @@ static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
         .series = {NULL, "voxels", "the paper's balls", "adaptive balls", "random points"}};
     for (size_t v = 0; v < anchors_variant_count; v++)
         for (int seed = 0; seed < s->grid.seeds; seed++) {
-            const study_figures *run = anchors_run(s, scene, v, seed);
+            const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
             points[chart.point_count++] =
                 (scatter_point){anchors_variants[v].series, run->anchors_final, run->psnr,
                                 seed == 0 ? anchors_variants[v].name : ""};
@@ -206,7 +206,7 @@ static void draw_scene(const anchors_study *s, size_t scene, int top, text *out)
 
 static void add_charts(const void *study, text *out)
 {
-    const anchors_study *s = study;
+    const grid_study *s = study;
     scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);

@@ -32,6 +32,12 @@ static inline study_figures *study_grid_at(const study_grid *g, size_t place, si
     return &g->figures[(place * g->variant_count + variant) * (size_t)g->seeds + (size_t)seed];
 }
 
+/** All of a study that is its grid alone. */
+typedef struct grid_study {
+    lab_runs_def def; /* strings borrowed */
+    study_grid grid;
+} grid_study;
+
 /** Make one run of a study in `folder`, or take it from there: its figures into `out`. */
 typedef gbt_status study_grid_run(const void *study, size_t scene, size_t variant, int seed,
                                   const char *folder, study_figures *out, gbt_error *err);

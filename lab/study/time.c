@@ -9,7 +9,7 @@
 static gbt_status run_one(const void *study, size_t of_data, size_t variant, int seed, const char *folder,
                           study_figures *out, gbt_error *err)
 {
-    const time_study *s = study;
+    const grid_study *s = study;
     const time_variant *v = &time_variants[variant];
     gbt_train_def def = gbt_train_def_default();
     def.eval_split = s->def.eval_split;
@@ -42,7 +42,7 @@ static gbt_status want_pinholes(const char *data, gbt_error *err)
 
 gbt_status lab_study_time(const lab_runs_def *def, const char *folder, FILE *out, gbt_error *err)
 {
-    time_study s = {.def = study_grid_def(def, 1, "auto", 0)};
+    grid_study s = {.def = study_grid_def(def, 1, "auto", 0)};
     if (!(def->budget_seconds > 0 && def->budget_seconds <= 1e6))
         return base_fail(err, GBT_ERR_ARGUMENT, "--budget: %g s (wanted more than 0, up to 1e6)",
                          def->budget_seconds);

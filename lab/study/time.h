@@ -24,25 +24,15 @@ typedef struct time_variant {
 extern const time_variant time_variants[];
 extern const size_t time_variant_count;
 
-typedef struct time_study {
-    lab_runs_def def; /* borrowed */
-    study_grid grid;
-} time_study;
-
-static inline const study_figures *time_run(const time_study *s, size_t place, size_t variant, int seed)
-{
-    return study_grid_at(&s->grid, place, variant, seed);
-}
-
 /** Held-out PSNR at the end over the seeds; and its change from the default's of the same seed. */
-stat_sample time_psnr(const time_study *s, size_t scene, size_t variant);
-stat_sample time_change(const time_study *s, size_t scene, size_t variant);
+stat_sample time_psnr(const grid_study *s, size_t scene, size_t variant);
+stat_sample time_change(const grid_study *s, size_t scene, size_t variant);
 
 /**
  * Mark `mark` of a curve over the seeds; mark TIME_MARKS is the end. False when a run has no such mark (a
  * step may pass several at once).
  */
-bool time_mark(const time_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr);
+bool time_mark(const grid_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr);
 
 /**
  * When a run first shows `psnr` or more: straight between its marks and its end, over log seconds; NaN when
@@ -53,7 +43,7 @@ double time_to_reach(const study_figures *run, double psnr);
 
 /** Seconds of the default to what the faithful protocol has in the end, by seed; NaN when a seed does not
     come there. */
-stat_sample time_saved(const time_study *s, size_t scene);
+stat_sample time_saved(const grid_study *s, size_t scene);
 
 /** How it is written down. */
 extern const study_output time_output;

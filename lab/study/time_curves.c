@@ -5,27 +5,28 @@
 
 #include <math.h>
 
-stat_sample time_psnr(const time_study *s, size_t scene, size_t variant)
+stat_sample time_psnr(const grid_study *s, size_t scene, size_t variant)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++)
-        values[seed] = time_run(s, scene, variant, seed)->psnr;
+        values[seed] = study_grid_at(&s->grid, scene, variant, seed)->psnr;
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-stat_sample time_change(const time_study *s, size_t scene, size_t variant)
+stat_sample time_change(const grid_study *s, size_t scene, size_t variant)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++)
-        values[seed] = time_run(s, scene, variant, seed)->psnr - time_run(s, scene, TIME_DEFAULT, seed)->psnr;
+        values[seed] = study_grid_at(&s->grid, scene, variant, seed)->psnr -
+                       study_grid_at(&s->grid, scene, TIME_DEFAULT, seed)->psnr;
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-bool time_mark(const time_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr)
+bool time_mark(const grid_study *s, size_t scene, size_t variant, size_t mark, double *seconds, double *psnr)
 {
     *seconds = *psnr = 0;
     for (int seed = 0; seed < s->grid.seeds; seed++) {
-        const study_figures *run = time_run(s, scene, variant, seed);
+        const study_figures *run = study_grid_at(&s->grid, scene, variant, seed);
         if (mark < TIME_MARKS && mark >= run->mark_count)
             return false;
         *seconds += (mark < TIME_MARKS ? run->marks[mark].seconds : run->train_seconds) / s->grid.seeds;
@@ -51,12 +52,12 @@ double time_to_reach(const study_figures *run, double psnr)
     return NAN;
 }
 
-stat_sample time_saved(const time_study *s, size_t scene)
+stat_sample time_saved(const grid_study *s, size_t scene)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
-        values[seed] = time_to_reach(time_run(s, scene, TIME_DEFAULT, seed),
-                                     time_run(s, scene, TIME_FAITHFUL, seed)->psnr);
+        values[seed] = time_to_reach(study_grid_at(&s->grid, scene, TIME_DEFAULT, seed),
+                                     study_grid_at(&s->grid, scene, TIME_FAITHFUL, seed)->psnr);
         if (!isfinite(values[seed]))
             return stat_of(NULL, 0); /* a mean without the slow ones would flatter */
     }

@@ -10,7 +10,7 @@
 
 /* ---- Markdown ---- */
 
-static void add_curves(const time_study *s, size_t scene, text *out)
+static void add_curves(const grid_study *s, size_t scene, text *out)
 {
     text_add(out, "| seconds: held-out PSNR, dB |");
     for (int mark = 0; mark <= TIME_MARKS; mark++)
@@ -31,12 +31,12 @@ static void add_curves(const time_study *s, size_t scene, text *out)
     text_add(out, "\n");
 }
 
-static double mean_of(const time_study *s, size_t scene, size_t variant,
+static double mean_of(const grid_study *s, size_t scene, size_t variant,
                       double (*figure)(const study_figures *))
 {
     double sum = 0;
     for (int seed = 0; seed < s->grid.seeds; seed++)
-        sum += figure(time_run(s, scene, variant, seed));
+        sum += figure(study_grid_at(&s->grid, scene, variant, seed));
     return sum / s->grid.seeds;
 }
 
@@ -46,7 +46,7 @@ static double anchors_of(const study_figures *run) { return run->anchors_final; 
 
 static double seconds_of(const study_figures *run) { return run->train_seconds; }
 
-static void add_variants(const time_study *s, size_t scene, text *out)
+static void add_variants(const grid_study *s, size_t scene, text *out)
 {
     text_add(out, "\n| run | seconds | iterations | anchors | PSNR, dB | change from the default, dB "
                   "|\n|---|---|---|---|---|---|\n");
@@ -65,7 +65,7 @@ static void add_variants(const time_study *s, size_t scene, text *out)
     }
 }
 
-static void add_words(const time_study *s, size_t scene, text *out)
+static void add_words(const grid_study *s, size_t scene, text *out)
 {
     const stat_sample reached = time_saved(s, scene), theirs = time_psnr(s, scene, TIME_FAITHFUL);
     if (!isfinite(theirs.mean)) {
@@ -88,7 +88,7 @@ static void add_words(const time_study *s, size_t scene, text *out)
 
 static void add_tables(const void *study, text *out)
 {
-    const time_study *s = study;
+    const grid_study *s = study;
     text_format(out,
                 "# Held-out PSNR against seconds\n\nA budget is %.4g s; the faithful protocol has %g of "
                 "them. Photos divided by %g, ",
@@ -110,10 +110,10 @@ static void add_tables(const void *study, text *out)
 
 /* ---- CSV, JSON ---- */
 
-static void add_csv_row(const time_study *s, size_t scene, size_t variant, int seed, double seconds,
+static void add_csv_row(const grid_study *s, size_t scene, size_t variant, int seed, double seconds,
                         double psnr, bool is_end, text *out)
 {
-    const study_figures *run = time_run(s, scene, variant, seed);
+    const study_figures *run = study_grid_at(&s->grid, scene, variant, seed);
     stat_csv_text(out, s->grid.names[scene]);
     text_format(out, ",\"%s\",%d,%d,%.6g,%.9g,%.0f,%.0f\n", time_variants[variant].name, seed, is_end,
                 seconds, psnr, run->iterations, run->anchors_final);
@@ -121,19 +121,19 @@ static void add_csv_row(const time_study *s, size_t scene, size_t variant, int s
 
 static void add_csv(const void *study, text *out)
 {
-    const time_study *s = study;
+    const grid_study *s = study;
     text_add(out, "scene,run,seed,is_end,seconds,psnr,iterations,anchors_final\n");
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         for (size_t v = 0; v < time_variant_count; v++)
             for (int seed = 0; seed < s->grid.seeds; seed++) {
-                const study_figures *run = time_run(s, scene, v, seed);
+                const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
                 for (size_t i = 0; i < run->mark_count; i++)
                     add_csv_row(s, scene, v, seed, run->marks[i].seconds, run->marks[i].psnr, false, out);
                 add_csv_row(s, scene, v, seed, run->train_seconds, run->psnr, true, out);
             }
 }
 
-static json_t *curve_to_json(const time_study *s, size_t scene, size_t variant)
+static json_t *curve_to_json(const grid_study *s, size_t scene, size_t variant)
 {
     json_t *curve = json_array();
     for (size_t mark = 0; mark <= TIME_MARKS; mark++) {
@@ -144,7 +144,7 @@ static json_t *curve_to_json(const time_study *s, size_t scene, size_t variant)
     return curve;
 }
 
-static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *runs)
+static void add_scene(const grid_study *s, size_t scene, json_t *rows, json_t *runs)
 {
     char row[STUDY_NAME_SIZE + 160];
     const stat_sample reached = time_saved(s, scene);
@@ -173,7 +173,7 @@ static void add_scene(const time_study *s, size_t scene, json_t *rows, json_t *r
 
 static json_t *data_of(const void *study)
 {
-    const time_study *s = study;
+    const grid_study *s = study;
     json_t *rows = json_array(), *runs = json_array();
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         add_scene(s, scene, rows, runs);
@@ -184,7 +184,7 @@ static json_t *data_of(const void *study)
 /* ---- charts ---- */
 
 /* Two curves, the ends of all others, and the height that the faithful protocol comes to. */
-static void draw_scene(const time_study *s, size_t scene, int top, text *out)
+static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
 {
     scatter_point points[2 * (TIME_MARKS + 1) + TIME_VARIANTS_MAX];
     char title[STUDY_NAME_SIZE + 40];
@@ -212,7 +212,7 @@ static void draw_scene(const time_study *s, size_t scene, int top, text *out)
 
 static void add_charts(const void *study, text *out)
 {
-    const time_study *s = study;
+    const grid_study *s = study;
     scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);

@@ -9,10 +9,10 @@
 #include "base/memory.h"
 #include "base/vec.h"
 
-static bool is_finite(const double *values, int count)
+static bool is_finite(const double point[3])
 {
-    for (int i = 0; i < count; i++)
-        if (!isfinite(values[i]))
+    for (int i = 0; i < 3; i++)
+        if (!isfinite(point[i]))
             return false;
     return true;
 }
@@ -26,7 +26,7 @@ bool gbt_camera_look_at(const double origin[3], const double target[3], const do
     dvec_normalize(forward);
     dvec_normalize(upward);
     dvec_cross(forward, upward, right);
-    if (!is_finite(origin, 3) || !(dvec_length(right) > 1e-9)) /* false for NaN too */
+    if (!is_finite(origin) || !(dvec_length(right) > 1e-9)) /* false for NaN too */
         return false;
     dvec_normalize(right);
     dvec_cross(forward, right, down);
@@ -84,8 +84,8 @@ static double axis_angle(const double r[9], double axis[3])
 bool camera_motion_prepare(const gbt_camera *start, const gbt_camera *end, camera_motion *out)
 {
     double back[9], turn[9];
-    if (!is_rotation(start->rotation) || !is_rotation(end->rotation) || !is_finite(start->center, 3) ||
-        !is_finite(end->center, 3))
+    if (!is_rotation(start->rotation) || !is_rotation(end->rotation) || !is_finite(start->center) ||
+        !is_finite(end->center))
         return false;
     for (int i = 0; i < 9; i++)
         back[i] = start->rotation[3 * (i % 3) + i / 3];

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -250,6 +251,12 @@ bool file_is_same(const char *a, const char *b)
 }
 
 bool file_is_one(const char *a, const char *b) { return strcmp(a, b) == 0 || file_is_same(a, b); }
+
+bool file_ends_with(const char *path, const char *ending)
+{
+    const size_t length = strlen(path), end = strlen(ending);
+    return length > end && strcasecmp(path + length - end, ending) == 0;
+}
 
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out)
 {

@@ -99,6 +99,9 @@ bool file_is_one(const char *a, const char *b);
 /** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out);
 
+/** Whether more stands before `ending` (".ply", in either case) at the end of a path. */
+bool file_ends_with(const char *path, const char *ending);
+
 /** "folder/name" in a buffer of `size` bytes; GBT_ERR_ARGUMENT when it does not fit. */
 gbt_status file_join(char *out, size_t size, const char *folder, const char *name, gbt_error *err);
 

@@ -27,7 +27,7 @@ typedef struct search {
     embree_context context; /* first: Embree hands this to the filters */
     const mesh_tree *tree;
     const float *origin, *dir;
-    float t_min, t_max;
+    float t_max;
     mesh_hit best; /* without the normal */
 } search;
 
@@ -74,8 +74,7 @@ static bool take(const struct RTCFilterFunctionNArguments *args)
     if (!meet(s, triangle, &t_exact, &u, &v) || fabs(t_exact) > (double)FLT_MAX)
         return false;
     const float t = (float)t_exact;
-    if (!(t > s->t_min && t <= s->t_max &&
-          (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
+    if (!(t > 0 && t <= s->t_max && (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
         return false;
     /* Not cut to the triangle: at an edge that would move the point by what Embree's float is off. */
     s->best = (mesh_hit){.t = t, .u = u, .v = v, .triangle = triangle};
@@ -171,10 +170,10 @@ gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uin
 /* False when the ray cannot be traced. Embree gets a range a little wider than asked, since the filter
    decides in double; and a direction of unusual length scaled by a power of two, which is exact, because it
    replaces components below 1e-18 by others. */
-static bool prepare(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
-                    float t_max, search *s, struct RTCRay *ray)
+static bool prepare(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max, search *s,
+                    struct RTCRay *ray)
 {
-    if (tree->scene == NULL || !(t_min >= 0 && t_min <= t_max))
+    if (tree->scene == NULL || !(t_max >= 0))
         return false;
     const int exponent = bvh_ray_exponent(dir);
     const float scaled[3] = {ldexpf(dir[0], -exponent), ldexpf(dir[1], -exponent), ldexpf(dir[2], -exponent)};
@@ -197,18 +196,17 @@ static bool prepare(const mesh_tree *tree, const float origin[3], const float di
     s->tree = tree;
     s->origin = origin;
     s->dir = dir;
-    s->t_min = t_min;
     s->t_max = t_max;
     s->best = (mesh_hit){.t = INFINITY, .triangle = UINT32_MAX};
     return true;
 }
 
-bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
-                     float t_max, mesh_hit *hit)
+bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max,
+                     mesh_hit *hit)
 {
     search s;
     struct RTCRayHit rayhit = {.hit = {.geomID = RTC_INVALID_GEOMETRY_ID, .primID = RTC_INVALID_GEOMETRY_ID}};
-    if (!prepare(tree, origin, dir, t_min, t_max, &s, &rayhit.ray))
+    if (!prepare(tree, origin, dir, t_max, &s, &rayhit.ray))
         return false;
     embree_intersect(tree->scene, &s.context, &rayhit);
     if (s.best.triangle == UINT32_MAX)
@@ -223,12 +221,11 @@ bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float d
     return true;
 }
 
-bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
-                       float t_max)
+bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max)
 {
     search s;
     struct RTCRay ray;
-    if (!prepare(tree, origin, dir, t_min, t_max, &s, &ray))
+    if (!prepare(tree, origin, dir, t_max, &s, &ray))
         return false;
     embree_occluded(tree->scene, &s.context, &ray);
     return s.best.triangle != UINT32_MAX;

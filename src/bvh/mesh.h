@@ -40,7 +40,7 @@ typedef struct mesh_hit {
 } mesh_hit;
 
 /**
- * The nearest hit with t_min < t <= t_max, from either side; among hits of equal float32 t the lowest
+ * The nearest hit with 0 < t <= t_max, from either side; among hits of equal float32 t the lowest
  * triangle number.
  *
  * t, u, v and the normal are computed in double (t and the normal are rounded), so they have the same bits
@@ -50,15 +50,14 @@ typedef struct mesh_hit {
  * @param dir [in] any length but 0; need not be unit
  * @param hit [out] untouched when there is none
  * @return false for no hit, and for a ray that cannot be traced: not finite, origin out of range, zero dir,
- *         t_min < 0, t_min > t_max. t_max may be infinite.
+ *         t_max < 0. t_max may be infinite.
  */
-bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
-                     float t_max, mesh_hit *hit);
+bool mesh_tree_trace(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max,
+                     mesh_hit *hit);
 
-/** Whether there is any hit with t_min < t <= t_max: what a shadow ray asks. False for a ray that cannot be
+/** Whether there is any hit with 0 < t <= t_max: what a shadow ray asks. False for a ray that cannot be
     traced. */
-bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_min,
-                       float t_max);
+bool mesh_tree_blocked(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max);
 
 void mesh_tree_free(mesh_tree *tree); /* NULL is fine */
 

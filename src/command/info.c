@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/camera_pose.h"
 #include "base/compare.h"
@@ -253,12 +252,6 @@ static gbt_status info_of_model(const char *path, bool json, FILE *out, gbt_erro
     return status;
 }
 
-static bool is_model_name(const char *path)
-{
-    const char *dot = strrchr(path, '.');
-    return dot != NULL && strcasecmp(dot, ".gbt") == 0;
-}
-
 gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err)
 {
     PLAIN_NUMBERS;
@@ -270,5 +263,6 @@ gbt_status gbt_info(const char *path, bool json, FILE *out, gbt_error *err)
     }
     if (gaussian_file_has_gaussians(path))
         return info_of_gaussians(path, json, out, err);
-    return is_model_name(path) ? info_of_model(path, json, out, err) : info_of_dataset(path, json, out, err);
+    return file_ends_with(path, ".gbt") ? info_of_model(path, json, out, err)
+                                        : info_of_dataset(path, json, out, err);
 }

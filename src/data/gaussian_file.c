@@ -48,14 +48,11 @@ static const char *list(const char *before_last, char out[LIST_SIZE])
 /* The longest ending that fits: .compressed.ply ends in .ply too. */
 static const gaussian_format *format_of(const char *path)
 {
-    const size_t length = strlen(path);
     const gaussian_format *found = NULL;
-    for (int i = 0; i < FORMAT_COUNT; i++) {
-        const size_t ending = strlen(formats[i]->ending);
-        if (length > ending && strcasecmp(path + length - ending, formats[i]->ending) == 0 &&
-            (found == NULL || ending > strlen(found->ending)))
+    for (int i = 0; i < FORMAT_COUNT; i++)
+        if (file_ends_with(path, formats[i]->ending) &&
+            (found == NULL || strlen(formats[i]->ending) > strlen(found->ending)))
             found = formats[i];
-    }
     return found;
 }
 

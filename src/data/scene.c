@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "base/fail.h"
 #include "base/file.h"
@@ -185,16 +184,10 @@ static gbt_status load_blender(const char *train, const char *folder, raw_scene 
     return raw_sort_views(raw, train, err);
 }
 
-static bool ends_with(const char *text, const char *ending)
-{
-    const size_t length = strlen(text), ending_length = strlen(ending);
-    return length >= ending_length && strcasecmp(text + length - ending_length, ending) == 0;
-}
-
 static gbt_status load_file_source(const char *path, raw_scene *raw, const char **source, gbt_error *err)
 {
     char folder[PATH_SIZE];
-    if (ends_with(path, ".ply")) {
+    if (file_ends_with(path, ".ply")) {
         *source = "ply";
         GBT_TRY(load_points(path, raw, err));
         if (raw->point_count == 0)
@@ -202,7 +195,7 @@ static gbt_status load_file_source(const char *path, raw_scene *raw, const char 
                              raw->points_dropped);
         return GBT_OK;
     }
-    if (ends_with(path, ".json")) {
+    if (file_ends_with(path, ".json")) {
         *source = "transforms";
         const char *slash = strrchr(path, '/');
         if (slash != NULL && (size_t)(slash - path) >= sizeof folder)

@@ -53,9 +53,9 @@ static json_t *from_scores(const evaluation *e)
     json_object_set_new(root, "downscale", json_real(e->downscale));
     json_object_set_new(root, "exposure", json_boolean(e->exposure));
     char scored[128];
-    snprintf(scored, sizeof scored, "%s%s",
+    snprintf(scored, sizeof scored, "%s%s%s",
              e->exposure ? "right half, with a colour matrix fitted to the left half" : "whole image",
-             e->masked ? ", without masked pixels" : "");
+             e->masked ? ", without masked pixels" : "", e->aligned ? ", from aligned poses" : "");
     json_object_set_new(root, "scored", json_string(scored));
     json_object_set_new(root, "views", views);
     json_object_set_new(root, "anchors_final", json_integer((json_int_t)e->anchors));

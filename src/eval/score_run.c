@@ -111,6 +111,8 @@ static gbt_status score_views(loaded_run *r, const lpips *net, const char *folde
         GBT_TRY(file_make_folder(folder, err));
     for (size_t i = 0; i < r->scene.view_count; i++)
         e->view_count += r->scene.views[i].is_test;
+    if (r->poses_refined && !r->held_out_aligned && e->view_count > 0)
+        log_warn("%s: held-out photos are not aligned to the scene: the run is not finished", r->data.folder);
     return score_own_views(r, net, folder, e, err);
 }
 
@@ -147,6 +149,7 @@ gbt_status score_run(loaded_run *r, const char *run, bool pictures, const lpips 
     e->gaussians_per_view /= (double)e->view_count;
     e->anchors = r->model.anchors.count;
     e->exposure = r->def.exposure;
+    e->aligned = r->poses_refined && r->held_out_aligned;
     e->renderer = r->frame.draw.renderer;
     e->downscale = r->photos.downscale;
     char model_path[4096];

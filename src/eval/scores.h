@@ -37,6 +37,7 @@ typedef struct evaluation {
     gbt_renderer renderer; /* what drew the views */
     double downscale;      /* the photos were divided by this */
     bool masked;           /* some view is */
+    bool aligned;          /* the photos' poses, to the scene (train/align.h) */
     bool exposure;         /* scored on the right halves of the photos (image/affine.h) */
 } evaluation;
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/colmap.c -- command lines for COLMAP 3.8 to 4, and its progress from what it prints. */
+/* pose/colmap.c -- command lines for COLMAP 3.6 to 4, and its progress from what it prints. */
 #include "pose/colmap.h"
 
 #include <math.h>
@@ -68,6 +68,7 @@ static void hear_extraction(const char *line, void *context)
 {
     dialect *d = context;
     d->new_extraction = d->new_extraction || strstr(line, "FeatureExtraction.use_gpu") != NULL;
+    d->camera_per_image = d->camera_per_image || strstr(line, "ImageReader.single_camera_per_image") != NULL;
 }
 
 static void hear_matching(const char *line, void *context)
@@ -76,16 +77,24 @@ static void hear_matching(const char *line, void *context)
     d->new_matching = d->new_matching || strstr(line, "FeatureMatching.use_gpu") != NULL;
 }
 
+static void hear_mapper(const char *line, void *context)
+{
+    dialect *d = context;
+    d->global_tolerance = d->global_tolerance || strstr(line, "Mapper.ba_global_function_tolerance") != NULL;
+}
+
 gbt_status colmap_find(const job *j, dialect *out, gbt_error *err)
 {
     static const char *const extraction[] = {"colmap", "feature_extractor", "-h", NULL};
     static const char *const matching[] = {"colmap", "exhaustive_matcher", "-h", NULL};
+    static const char *const mapper[] = {"colmap", "mapper", "-h", NULL};
     char log_path[JOB_PATH_SIZE];
     *out = (dialect){0};
     GBT_TRY(job_path(j, "options.log", log_path, err));
     unlink(log_path);
     GBT_TRY(child_run(extraction, log_path, hear_extraction, out, err));
-    return child_run(matching, log_path, hear_matching, out, err);
+    GBT_TRY(child_run(matching, log_path, hear_matching, out, err));
+    return child_run(mapper, log_path, hear_mapper, out, err);
 }
 
 /* ---- progress ---- */
@@ -220,6 +229,8 @@ static gbt_status extract_group(const job *j, const dialect *d, int group, progr
         add(&c, "ImageReader.single_camera", "1");
         if (camera > 0)
             add_number(&c, "ImageReader.existing_camera_id", (long)camera);
+    } else if (d->camera_per_image) {
+        add(&c, "ImageReader.single_camera_per_image", "1");
     }
     add(&c, d->new_extraction ? "FeatureExtraction.use_gpu" : "SiftExtraction.use_gpu", "0");
     add_number(&c, d->new_extraction ? "FeatureExtraction.num_threads" : "SiftExtraction.num_threads",
@@ -353,7 +364,7 @@ static gbt_status remove_models(const job *j, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status map(const job *j, gbt_error *err)
+static gbt_status map(const job *j, const dialect *d, gbt_error *err)
 {
     char log_path[JOB_PATH_SIZE];
     gbt_error why = {0};
@@ -365,7 +376,8 @@ static gbt_status map(const job *j, gbt_error *err)
     begin_command(&c, j, "mapper");
     add(&c, "image_path", j->images);
     add(&c, "output_path", j->models);
-    add(&c, "Mapper.ba_global_function_tolerance", "0.000001"); /* the default, 0, never ends early */
+    if (d->global_tolerance)
+        add(&c, "Mapper.ba_global_function_tolerance", "0.000001"); /* the default, 0, never ends early */
     add_number(&c, "Mapper.num_threads", parallel_threads());
     progress p = begin("mapping", j->photo_count);
     gbt_status status = child_run(c.arguments, log_path, hear_mapping, &p, &why);
@@ -382,5 +394,5 @@ gbt_status colmap_stages(const job *j, const dialect *d, gbt_error *err)
         GBT_TRY(extract(j, d, err));
     if (!job_is_done(j, "matching"))
         GBT_TRY(match(j, d, err));
-    return job_is_done(j, "mapping") ? GBT_OK : map(j, err);
+    return job_is_done(j, "mapping") ? GBT_OK : map(j, d, err);
 }

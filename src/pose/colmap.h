@@ -5,9 +5,11 @@
 
 #include "pose/job.h"
 
-/** COLMAP 4 calls SiftExtraction.use_gpu FeatureExtraction.use_gpu, and likewise of matching. */
+/** COLMAP 4 calls SiftExtraction.use_gpu FeatureExtraction.use_gpu, and likewise of matching. The others are
+    options that older ones lack. */
 typedef struct dialect {
     bool new_extraction, new_matching;
+    bool camera_per_image, global_tolerance;
 } dialect;
 
 /** Which names the installed one has; GBT_ERR_IO when there is none. */

@@ -85,12 +85,16 @@ static gbt_status add_count(database *d, const char *query, size_t *count, gbt_e
     return status;
 }
 
-/* COLMAP 3.12 moved positions to a table of their own. */
+/* COLMAP 3.12 moved positions to a table of their own. A photo of which it knows nothing but where down is
+   has a row, too, of three NaN: the sign and exponent of the first double are looked at. */
 gbt_status database_positions(database *d, size_t *count, gbt_error *err)
 {
     *count = 0;
     GBT_TRY(add_count(d, "SELECT count(*) FROM images WHERE prior_tx IS NOT NULL", count, err));
-    return add_count(d, "SELECT count(*) FROM pose_priors", count, err);
+    return add_count(d,
+                     "SELECT count(*) FROM pose_priors WHERE position IS NOT NULL AND NOT "
+                     "(substr(hex(position), 15, 2) IN ('7F', 'FF') AND substr(hex(position), 13, 1) = 'F')",
+                     count, err);
 }
 
 gbt_status database_pairs(database *d, void (*pair)(uint32_t a, uint32_t b, int64_t matches, void *context),

@@ -31,6 +31,14 @@ gbt_status job_set_done(const job *j, const char *stage, gbt_error *err)
     return file_write_atomic(path, "", 0, err);
 }
 
+void job_set_undone(const job *j, const char *stage)
+{
+    char name[32], path[JOB_PATH_SIZE];
+    snprintf(name, sizeof name, "%s.done", stage);
+    if (job_path(j, name, path, NULL) == GBT_OK)
+        unlink(path);
+}
+
 void job_remove_folder(const char *folder)
 {
     DIR *entries = opendir(folder);

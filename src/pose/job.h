@@ -41,5 +41,6 @@ void job_remove_folder(const char *folder);
 /** A stage is finished when an empty file says so. */
 bool job_is_done(const job *j, const char *stage);
 gbt_status job_set_done(const job *j, const char *stage, gbt_error *err);
+void job_set_undone(const job *j, const char *stage);
 
 #endif

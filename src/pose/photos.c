@@ -77,7 +77,10 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
             status = file_look(path, &found, err);
         if (status == GBT_OK && found == FILE_FOLDER) {
             strcat(name, "/");
-            if (depth < DEPTH_MAX && !file_is_same(path, j->data)) /* its photos are links to these */
+            if (strcmp(name, "masks/") == 0)
+                log_warn("%s: not used to find poses (copy it to %s/masks, where train reads masks)", path,
+                         j->data);
+            else if (depth < DEPTH_MAX && !file_is_same(path, j->data)) /* its photos are links to these */
                 status = walk(j, root, name, depth + 1, err);
         } else if (status == GBT_OK && unposed_is_photo(name)) {
             status = take_photo(j, path, name, err);

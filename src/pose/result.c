@@ -93,7 +93,10 @@ static gbt_status find_largest(const job *j, char best[JOB_PATH_SIZE], gbt_error
         GBT_TRY(file_look(folder, &kind, err));
         if (kind != FILE_FOLDER)
             continue;
-        GBT_TRY(model_read(folder, &m, err));
+        const gbt_status status = model_read(folder, &m, err);
+        if (status == GBT_ERR_FORMAT) /* COLMAP does not notice when the disk is full */
+            job_set_undone(j, "mapping");
+        GBT_TRY(status);
         models++;
         if (m->raw.view_count > best_views ||
             (m->raw.view_count == best_views && m->raw.point_count > best_points)) {

@@ -6,7 +6,7 @@
 #include "pose/job.h"
 
 /** Copy the model with the most photos to DATA/sparse/0, whole or not at all. GBT_ERR_FORMAT when there is
-    none. */
+    none, and when one is damaged: then mapping is not done. */
 gbt_status result_take(const job *j, gbt_error *err);
 
 /** What DATA/sparse/0 holds, and which photos it lacks and why: on `report`, and all of them in

@@ -122,9 +122,9 @@ static bool holds_model(const char *folder)
 
 static gbt_status read_balls(gbt_balls *b, const char *path, gbt_error *err)
 {
-    if (query_ends_with(path, ".txt") || query_ends_with(path, ".csv") || query_ends_with(path, ".xyz"))
+    if (file_ends_with(path, ".txt") || file_ends_with(path, ".csv") || file_ends_with(path, ".xyz"))
         return from_rows(b, path, err);
-    if (query_ends_with(path, ".ply") && !file_is_folder(path))
+    if (file_ends_with(path, ".ply") && !file_is_folder(path))
         return gaussian_file_has_gaussians(path) ? from_run(b, path, err) : from_rows(b, path, err);
     if (file_is_folder(path) && !holds_model(path) && !gaussian_file_readable(path))
         return from_data(b, path, err);

@@ -3,7 +3,6 @@
 #include "query/rows.h"
 
 #include <string.h>
-#include <strings.h>
 
 #include "base/fail.h"
 #include "base/file.h"
@@ -15,12 +14,6 @@ void query_rows_free(query_rows *rows)
 {
     mem_free(rows->value);
     *rows = (query_rows){0};
-}
-
-bool query_ends_with(const char *path, const char *ending)
-{
-    const size_t length = strlen(path), tail = strlen(ending);
-    return length >= tail && strcasecmp(path + length - tail, ending) == 0;
 }
 
 static gbt_status add_row(query_rows *rows, const double *values, gbt_error *err)
@@ -129,7 +122,7 @@ gbt_status query_rows_read(const char *path, size_t least, size_t most, query_ro
     size_t size;
     GBT_TRY(file_read(path, &bytes, &size, err));
     const gbt_status status =
-        query_ends_with(path, ".ply")
+        file_ends_with(path, ".ply")
             ? read_ply(&(source_file){.name = path, .bytes = bytes, .size = size}, least, most, out, err)
             : query_rows_parse(path, (const char *)bytes, size, least, most, out, err);
     mem_free(bytes);

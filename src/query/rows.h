@@ -3,7 +3,6 @@
 #ifndef GBT_QUERY_ROWS_H
 #define GBT_QUERY_ROWS_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "gbtrace/status.h"
@@ -32,8 +31,5 @@ gbt_status query_rows_parse(const char *name, const char *text, size_t size, siz
 gbt_status query_rows_read(const char *path, size_t least, size_t most, query_rows *out, gbt_error *err);
 
 void query_rows_free(query_rows *rows);
-
-/** Whether a name ends so. */
-bool query_ends_with(const char *path, const char *ending);
 
 #endif

@@ -197,10 +197,10 @@ typedef struct pose_curve {
     double turn_length;
 } pose_curve;
 
-static double distance_of(const double *a, const double *b, int dimensions)
+static double distance_of(const double *a, const double *b)
 {
     double sum = 0;
-    for (int k = 0; k < dimensions; k++)
+    for (int k = 0; k < DIMENSIONS; k++)
         sum += (a[k] - b[k]) * (a[k] - b[k]);
     return sqrt(sum);
 }
@@ -247,7 +247,7 @@ static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_l
     for (size_t i = 0; i < count; i++) {
         const size_t n = c->count;
         point_of(&keys[i], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
-        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1], DIMENSIONS) : 0;
+        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1]) : 0;
         if (n > 0 && !(way > 1e-9 * turn_length))
             continue;
         if (n > 0)
@@ -307,7 +307,7 @@ static void measure(const pose_curve *c, double *length)
     length[0] = 0;
     for (size_t i = 1; i <= (c->count - 1) * STEPS; i++) {
         curve_at(c, (i - 1) / STEPS, (double)((i - 1) % STEPS + 1) / STEPS, at);
-        length[i] = length[i - 1] + distance_of(before, at, DIMENSIONS);
+        length[i] = length[i - 1] + distance_of(before, at);
         memcpy(before, at, sizeof before);
     }
 }
@@ -354,7 +354,7 @@ static double way_between(const gbt_camera *a, const gbt_camera *b, double turn_
     double p[DIMENSIONS], q[DIMENSIONS];
     point_of(a, turn_length, NULL, p);
     point_of(b, turn_length, p, q);
-    return distance_of(p, q, DIMENSIONS);
+    return distance_of(p, q);
 }
 
 gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_length, gbt_error *err)

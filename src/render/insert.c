@@ -44,7 +44,7 @@ static void find_surfaces(size_t block, size_t begin, size_t end, void *context)
         mesh_hit hit;
         const float *dir = s->rays->dir + 3 * i;
         const float t_max = s->rays->far != NULL ? s->rays->far[i] : INFINITY;
-        const bool found = mesh_tree_trace(s->in->tree, ray_image_origin(s->rays, i), dir, 0, t_max, &hit);
+        const bool found = mesh_tree_trace(s->in->tree, ray_image_origin(s->rays, i), dir, t_max, &hit);
         s->far[i] = found ? hit.t : t_max;
         s->surface[i].object = NO_OBJECT;
         if (found)
@@ -66,7 +66,7 @@ static void shadow_gaussians(size_t block, size_t begin, size_t end, void *conte
             point[k] = ray_image_origin(s->rays, i)[k] + s->depth[i] * s->rays->dir[3 * i + k];
         for (int sample = 0; sample < samples && s->depth[i] > 0; sample++)
             blocked += insert_towards_lamp(s->in, point, sample, i, dir, &far) &&
-                       mesh_tree_blocked(s->in->tree, point, dir, 0, far);
+                       mesh_tree_blocked(s->in->tree, point, dir, far);
         const float light = 1 - (1 - s->in->ambient) * (float)blocked / (float)samples;
         for (size_t k = 0; k < 3; k++)
             s->rgb->pixels[3 * i + k] *= light;
@@ -116,7 +116,7 @@ static void lamp_rays(size_t block, size_t begin, size_t end, void *context)
         const bool lamp =
             is_matt(s, i) && insert_towards_lamp(s->in, at->point, s->sample, i, dir, &s->next.far[i]);
         const bool in_front = lamp && dir[0] * at->flat[0] + dir[1] * at->flat[1] + dir[2] * at->flat[2] > 0;
-        if (in_front && !mesh_tree_blocked(s->in->tree, at->point, dir, 0, s->next.far[i]))
+        if (in_front && !mesh_tree_blocked(s->in->tree, at->point, dir, s->next.far[i]))
             memcpy(s->next.origin + 3 * i, at->point, sizeof at->point);
         else
             no_ray(&s->next, i);

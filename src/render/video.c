@@ -9,12 +9,12 @@
 #include <spawn.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/memory.h"
 
 enum { PATH_LIMIT = 4096, ARGUMENTS_MAX = 48 };
@@ -49,16 +49,10 @@ struct video {
     unsigned char *row; /* one picture, [height][width][3] */
 };
 
-static bool ends_with(const char *path, const char *ending)
-{
-    const size_t length = strlen(path), end = strlen(ending);
-    return length > end && strcasecmp(path + length - end, ending) == 0;
-}
-
 static int kind_of(const char *path)
 {
     int i = 0;
-    while (i < KINDS && !ends_with(path, kinds[i].ending))
+    while (i < KINDS && !file_ends_with(path, kinds[i].ending))
         i++;
     return i;
 }
@@ -69,7 +63,7 @@ gbt_status video_check_name(const char *path, gbt_error *err)
 {
     static const char *const others[] = {".mov", ".m4v", ".mkv", ".avi", ".mpg", ".mpeg", ".wmv", ".ogv"};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
-        if (ends_with(path, others[i]))
+        if (file_ends_with(path, others[i]))
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)",
                              path);

@@ -93,8 +93,7 @@ static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *fo
         memcpy(out, folder.ply, RESULT_PATH_SIZE);
         return GBT_OK;
     }
-    const size_t length = strlen(run);
-    *found = length > 4 && length < RESULT_PATH_SIZE && strcasecmp(run + length - 4, ".ply") == 0;
+    *found = strlen(run) < RESULT_PATH_SIZE && file_ends_with(run, ".ply");
     snprintf(out, RESULT_PATH_SIZE, "%s", run);
     return GBT_OK;
 }
@@ -184,8 +183,9 @@ static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
 {
     char path[4096];
     GBT_TRY(file_join(path, sizeof path, r->data.folder, POSE_FILE_NAME, err));
-    if (file_exists(path))
-        return pose_file_read(path, &r->scene, err);
+    r->poses_refined = file_exists(path);
+    if (r->poses_refined)
+        return pose_file_read(path, &r->scene, &r->held_out_aligned, err);
     log_warn("%s is not there: photos have the poses of the data set, not those that training found", path);
     return GBT_OK;
 }
@@ -221,6 +221,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     if (!seen_points_tell(&out->scene)) /* as in training */
         GBT_TRY(scene_forget_points(&out->scene, false, err));
     scene_set_alpha(&out->scene, out->def.alpha);
+    out->poses_refined = false;
     if (out->def.refine_poses && (data == NULL || file_is_same(data, out->data.place)))
         GBT_TRY(take_refined_poses(out, err));
     return place_views(downscale, out, err);

@@ -21,9 +21,11 @@ typedef struct loaded_run {
     cell_drawer cell_drawer;
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
-    int picture_width; /* of a result folder that says so; then def.downscale is 0. Else 0 */
-    run_data data;     /* where its data set is */
-    scene scene;       /* cameras and points in the model's local coordinates */
+    int picture_width;     /* of a result folder that says so; then def.downscale is 0. Else 0 */
+    run_data data;         /* where its data set is */
+    scene scene;           /* cameras and points in the model's local coordinates */
+    bool poses_refined;    /* the cameras are those of RUN/poses.json */
+    bool held_out_aligned; /* then: as it says (train/pose_file.h) */
     photos photos;
     trace_settings settings;
     frame frame;

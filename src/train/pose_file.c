@@ -19,13 +19,14 @@ static json_t *numbers(const double *values, int count)
     return array;
 }
 
-gbt_status pose_file_write(const scene *s, const char *path, gbt_error *err)
+gbt_status pose_file_write(const scene *s, bool held_out_aligned, const char *path, gbt_error *err)
 {
     json_t *root = json_object(), *photos = json_array();
     json_object_set_new(root, "schema", json_integer(1));
     json_object_set_new(root, "meaning",
                         json_string("point in camera axes (x right, y down, z forward) = rotation (3 x 3, "
                                     "rows) * (point in world axes - center)"));
+    json_object_set_new(root, "held_out_aligned", json_boolean(held_out_aligned));
     for (size_t i = 0; i < s->view_count; i++) {
         const gbt_camera *camera = &s->views[i].camera;
         double center[3];
@@ -93,11 +94,12 @@ static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt
     return GBT_OK;
 }
 
-gbt_status pose_file_read(const char *path, scene *s, gbt_error *err)
+gbt_status pose_file_read(const char *path, scene *s, bool *held_out_aligned, gbt_error *err)
 {
     json_t *root;
     GBT_TRY(json_read(path, &root, err));
     const gbt_status status = take_poses(root, path, s, err);
+    *held_out_aligned = !json_is_false(json_object_get(root, "held_out_aligned"));
     json_decref(root);
     return status;
 }

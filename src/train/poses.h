@@ -24,6 +24,7 @@ typedef struct poses {
     double *packed;    /* [scene.view_count][POSE_PACKED]: room for poses_pack() */
     float *moment1, *moment2; /* [count][POSE_NUMBERS] */
     uint64_t *visits;         /* [count] Adam steps of each */
+    bool held_out_aligned;    /* held-out photos, to the scene as it is (train/align.h) */
 } poses;
 
 /** Of `count` photos of `s`, whose cameras are the given ones. `unit` > 0. */

@@ -96,6 +96,7 @@ static gbt_status finish_poses(trainer *t, gbt_error *err)
 {
     double angle, distance;
     GBT_TRY(align_held_out(t, err));
+    t->poses.held_out_aligned = true;
     GBT_TRY(poses_moved(&t->poses, &t->scene, t->train_views, t->train_count, &angle, &distance, err));
     log_info("%s: poses moved by %.2g degrees and %.2g scene units (the median photo); %zu held-out photos "
              "are scored from where the scene fits them best",

@@ -81,7 +81,7 @@ gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
     if (t->exposures.count > 0)
         GBT_TRY(save_exposures(t, paths->exposure, err));
     if (t->poses.count > 0)
-        GBT_TRY(pose_file_write(&t->scene, paths->poses, err));
+        GBT_TRY(pose_file_write(&t->scene, t->poses.held_out_aligned, paths->poses, err));
     return save_model(t, paths->model, err);
 }
 

@@ -19,22 +19,21 @@ static const uint32_t hand_triangles[] = {0, 1, 2, 0, 6, 7, 5, 4, 3};
 
 typedef struct hand_case {
     const char *name;
-    float origin[3], dir[3], t_min, t_max;
+    float origin[3], dir[3], t_max;
     bool hit;
     float t, u, v, normal_z;
     uint32_t triangle;
 } hand_case;
 
 static const hand_case hand_cases[] = {
-    {"front", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, 100, true, 5, 0.25f, 0.5f, 1, 0},
-    {"to infinity", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, INFINITY, true, 5, 0.25f, 0.5f, 1, 0},
-    {"t in lengths of dir", {0.25f, 0.5f, 0}, {0, 0, 4}, 0, 100, true, 1.25f, 0.25f, 0.5f, 1, 0},
-    {"tiny dir", {0.25f, 0.5f, 0}, {0, 0, 0x1p-100f}, 0, INFINITY, true, 5 * 0x1p100f, 0.25f, 0.5f, 1, 0},
-    {"huge dir", {0.25f, 0.5f, 0}, {0, 0, 0x1p120f}, 0, 1, true, 5 * 0x1p-120f, 0.25f, 0.5f, 1, 0},
+    {"front", {0.25f, 0.5f, 0}, {0, 0, 1}, 100, true, 5, 0.25f, 0.5f, 1, 0},
+    {"to infinity", {0.25f, 0.5f, 0}, {0, 0, 1}, INFINITY, true, 5, 0.25f, 0.5f, 1, 0},
+    {"t in lengths of dir", {0.25f, 0.5f, 0}, {0, 0, 4}, 100, true, 1.25f, 0.25f, 0.5f, 1, 0},
+    {"tiny dir", {0.25f, 0.5f, 0}, {0, 0, 0x1p-100f}, INFINITY, true, 5 * 0x1p100f, 0.25f, 0.5f, 1, 0},
+    {"huge dir", {0.25f, 0.5f, 0}, {0, 0, 0x1p120f}, 1, true, 5 * 0x1p-120f, 0.25f, 0.5f, 1, 0},
     {"slanted, components far apart",
      {0.25f, 0.5f, 0},
      {0x1p-20f, 0, 0x1p30f},
-     0,
      1,
      true,
      5 * 0x1p-30f,
@@ -42,11 +41,10 @@ static const hand_case hand_cases[] = {
      0.5f,
      1,
      0},
-    {"t beyond float32 is no hit", {0.25f, 0.5f, 0}, {0, 0, 0x1p-127f}, 0, INFINITY, false, 0, 0, 0, 0, 0},
+    {"t beyond float32 is no hit", {0.25f, 0.5f, 0}, {0, 0, 0x1p-127f}, INFINITY, false, 0, 0, 0, 0, 0},
     {"from behind the other is first, normal stays",
      {0.25f, 0.5f, 10},
      {0, 0, -1},
-     0,
      100,
      true,
      3,
@@ -54,27 +52,24 @@ static const hand_case hand_cases[] = {
      0.25f,
      -1,
      2},
-    {"between the two", {0.25f, 0.5f, 6}, {0, 0, 1}, 0, 100, true, 1, 0.25f, 0.25f, -1, 2},
-    {"t_max is included", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, 5, true, 5, 0.25f, 0.5f, 1, 0},
-    {"just short of it", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, 4.9999995f, false, 0, 0, 0, 0, 0},
-    {"t_min is excluded", {0.25f, 0.5f, 0}, {0, 0, 1}, 5, 100, true, 7, 0.25f, 0.25f, -1, 2},
-    {"just before it", {0.25f, 0.5f, 0}, {0, 0, 1}, 4.9999995f, 100, true, 5, 0.25f, 0.5f, 1, 0},
-    {"behind", {0.25f, 0.5f, 8}, {0, 0, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"beside", {0.75f, 0.5f, 0}, {0, 0, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"no area, no hit", {1.5f, 0, 0}, {0, 0, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"parallel", {-1, 0.5f, 5}, {1, 0, 0}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"empty range", {0.25f, 0.5f, 0}, {0, 0, 1}, 6, 4, false, 0, 0, 0, 0, 0},
-    {"bad: origin NaN", {NAN, 0.5f, 0}, {0, 0, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"bad: origin infinite", {0.25f, INFINITY, 0}, {0, 0, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"bad: origin out of range", {0.25f, 0.5f, -2e12f}, {0, 0, 1}, 0, INFINITY, false, 0, 0, 0, 0, 0},
-    {"bad: dir zero", {0.25f, 0.5f, 0}, {0, 0, 0}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"bad: dir NaN", {0.25f, 0.5f, 0}, {0, NAN, 1}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"bad: dir infinite", {0.25f, 0.5f, 0}, {0, 0, INFINITY}, 0, 100, false, 0, 0, 0, 0, 0},
-    {"bad: t_min NaN", {0.25f, 0.5f, 0}, {0, 0, 1}, NAN, 100, false, 0, 0, 0, 0, 0},
-    {"bad: t_min negative", {0.25f, 0.5f, 0}, {0, 0, 1}, -1, 100, false, 0, 0, 0, 0, 0},
-    {"bad: t_min infinite", {0.25f, 0.5f, 0}, {0, 0, 1}, INFINITY, INFINITY, false, 0, 0, 0, 0, 0},
-    {"bad: t_max NaN", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, NAN, false, 0, 0, 0, 0, 0},
-    {"bad: t_max negative", {0.25f, 0.5f, 0}, {0, 0, 1}, 0, -1, false, 0, 0, 0, 0, 0},
+    {"between the two", {0.25f, 0.5f, 6}, {0, 0, 1}, 100, true, 1, 0.25f, 0.25f, -1, 2},
+    {"t_max is included", {0.25f, 0.5f, 0}, {0, 0, 1}, 5, true, 5, 0.25f, 0.5f, 1, 0},
+    {"just short of it", {0.25f, 0.5f, 0}, {0, 0, 1}, 4.9999995f, false, 0, 0, 0, 0, 0},
+    {"0 is excluded", {0.25f, 0.5f, 5}, {0, 0, 1}, 100, true, 2, 0.25f, 0.25f, -1, 2},
+    {"just before it", {0.25f, 0.5f, 4.9999995f}, {0, 0, 1}, 100, true, 0x1p-21f, 0.25f, 0.5f, 1, 0},
+    {"behind", {0.25f, 0.5f, 8}, {0, 0, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"beside", {0.75f, 0.5f, 0}, {0, 0, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"no area, no hit", {1.5f, 0, 0}, {0, 0, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"parallel", {-1, 0.5f, 5}, {1, 0, 0}, 100, false, 0, 0, 0, 0, 0},
+    {"empty range", {0.25f, 0.5f, 5}, {0, 0, 1}, 0, false, 0, 0, 0, 0, 0},
+    {"bad: origin NaN", {NAN, 0.5f, 0}, {0, 0, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"bad: origin infinite", {0.25f, INFINITY, 0}, {0, 0, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"bad: origin out of range", {0.25f, 0.5f, -2e12f}, {0, 0, 1}, INFINITY, false, 0, 0, 0, 0, 0},
+    {"bad: dir zero", {0.25f, 0.5f, 0}, {0, 0, 0}, 100, false, 0, 0, 0, 0, 0},
+    {"bad: dir NaN", {0.25f, 0.5f, 0}, {0, NAN, 1}, 100, false, 0, 0, 0, 0, 0},
+    {"bad: dir infinite", {0.25f, 0.5f, 0}, {0, 0, INFINITY}, 100, false, 0, 0, 0, 0, 0},
+    {"bad: t_max NaN", {0.25f, 0.5f, 0}, {0, 0, 1}, NAN, false, 0, 0, 0, 0, 0},
+    {"bad: t_max negative", {0.25f, 0.5f, 0}, {0, 0, 1}, -1, false, 0, 0, 0, 0, 0},
 };
 
 static void hand(void **state)
@@ -85,8 +80,8 @@ static void hand(void **state)
     mesh_hit hit, untouched;
     memset(&hit, 0x5a, sizeof hit);
     memset(&untouched, 0x5a, sizeof untouched);
-    assert_int_equal(mesh_tree_trace(tree, c->origin, c->dir, c->t_min, c->t_max, &hit), c->hit);
-    assert_int_equal(mesh_tree_blocked(tree, c->origin, c->dir, c->t_min, c->t_max), c->hit);
+    assert_int_equal(mesh_tree_trace(tree, c->origin, c->dir, c->t_max, &hit), c->hit);
+    assert_int_equal(mesh_tree_blocked(tree, c->origin, c->dir, c->t_max), c->hit);
     if (c->hit) {
         assert_true(hit.t == c->t);
         assert_true((float)hit.u == c->u && (float)hit.v == c->v);
@@ -107,8 +102,8 @@ static void empty_meshes(void **state)
         assert_ok(mesh_tree_build(hand_vertices, vertex_count, hand_triangles, 0, &tree, NULL));
         assert_non_null(tree);
         mesh_hit hit;
-        assert_false(mesh_tree_trace(tree, origin, dir, 0, 100, &hit));
-        assert_false(mesh_tree_blocked(tree, origin, dir, 0, 100));
+        assert_false(mesh_tree_trace(tree, origin, dir, 100, &hit));
+        assert_false(mesh_tree_blocked(tree, origin, dir, 100));
         mesh_tree_free(tree);
     }
     mesh_tree_free(NULL);
@@ -219,8 +214,8 @@ static void agrees_with_brute_force(void **state)
             if (!clear || second - best < 1e-3)
                 continue;
             mesh_hit hit;
-            const bool got = mesh_tree_trace(tree, origin, dir, 0, INFINITY, &hit);
-            if (got != (bool)isfinite(best) || mesh_tree_blocked(tree, origin, dir, 0, INFINITY) != got)
+            const bool got = mesh_tree_trace(tree, origin, dir, INFINITY, &hit);
+            if (got != (bool)isfinite(best) || mesh_tree_blocked(tree, origin, dir, INFINITY) != got)
                 fail_msg("seed %llu ray %llu: hit %d, wanted t %g", (unsigned long long)seed,
                          (unsigned long long)r, got, best);
             if (!got) {
@@ -278,8 +273,8 @@ static void closed_mesh_has_no_gaps(void **state)
             dir[j] = w * vertices[3 * a + j] + (1 - w) * vertices[3 * b + j] - origin[j];
         }
         mesh_hit hit;
-        if (!mesh_tree_trace(tree, origin, dir, 0, INFINITY, &hit) ||
-            !mesh_tree_blocked(tree, origin, dir, 0, INFINITY))
+        if (!mesh_tree_trace(tree, origin, dir, INFINITY, &hit) ||
+            !mesh_tree_blocked(tree, origin, dir, INFINITY))
             fail_msg("ray %llu escaped", (unsigned long long)r);
         double facing = 0; /* the cube is wound outwards */
         for (int j = 0; j < 3; j++)
@@ -304,7 +299,7 @@ static void ties_go_to_the_lowest_number(void **state)
         assert_ok(mesh_tree_build(hand_vertices, 8, &triangles[0][0], COUNT, &tree, NULL));
         const float origin[3] = {0.25f, 0.5f, 0}, dir[3] = {0, 0, 1};
         mesh_hit hit;
-        assert_true(mesh_tree_trace(tree, origin, dir, 0, 100, &hit));
+        assert_true(mesh_tree_trace(tree, origin, dir, 100, &hit));
         assert_int_equal(hit.triangle, lowest);
         assert_true(hit.t == 5);
         mesh_tree_free(tree);
@@ -326,7 +321,7 @@ static void input_is_copied(void **state)
     mem_free(triangles);
     const float origin[3] = {0.25f, 0.5f, 0}, dir[3] = {0, 0, 1};
     mesh_hit hit;
-    assert_true(mesh_tree_trace(tree, origin, dir, 0, 100, &hit));
+    assert_true(mesh_tree_trace(tree, origin, dir, 100, &hit));
     assert_true(hit.t == 5 && hit.normal[2] == 1);
     mesh_tree_free(tree);
 }
@@ -365,7 +360,7 @@ static void trace_block(size_t block, size_t begin, size_t end, void *context)
             dir[j] = uniform(77, 10 * r + 5 + j, -1, 1);
         }
         memset(&job->hits[r], 0, sizeof job->hits[r]);
-        mesh_tree_trace(job->tree, origin, dir, 0, INFINITY, &job->hits[r]);
+        mesh_tree_trace(job->tree, origin, dir, INFINITY, &job->hits[r]);
     }
 }
 

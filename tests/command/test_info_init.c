@@ -46,8 +46,8 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-/** A cubic grid of side^3 points, `step` apart, at `offset`. */
-static const char *write_grid(const char *name, int side, double step, double offset)
+/** A cubic grid of side^3 points, 1 apart, at `offset`. */
+static const char *write_grid(const char *name, int side, double offset)
 {
     const char *path = in_folder(name);
     FILE *file = fopen(path, "w");
@@ -57,8 +57,8 @@ static const char *write_grid(const char *name, int side, double step, double of
             "z\nend_header\n",
             side * side * side);
     for (int i = 0; i < side * side * side; i++)
-        fprintf(file, "%.17g %.17g %.17g\n", offset + step * (i % side), offset + step * (i / side % side),
-                offset + step * (i / side / side));
+        fprintf(file, "%.17g %.17g %.17g\n", offset + i % side, offset + i / side % side,
+                offset + i / side / side);
     fclose(file);
     return path;
 }
@@ -91,7 +91,7 @@ static double number(const json_t *object, const char *key)
 static void info_of_a_cloud(void **state)
 {
     (void)state;
-    json_t *value = info_as_json(write_grid("cloud.ply", 4, 1.0, 1e6));
+    json_t *value = info_as_json(write_grid("cloud.ply", 4, 1e6));
     assert_string_equal(json_string_value(json_object_get(value, "kind")), "dataset");
     assert_string_equal(json_string_value(json_object_get(value, "source")), "ply");
     assert_true(number(value, "points") == 64);
@@ -196,7 +196,7 @@ static void info_writes_nothing_when_it_fails(void **state)
 static void init_counts(void **state)
 {
     (void)state;
-    const char *data = write_grid("cloud.ply", 4, 1.0, 0.0);
+    const char *data = write_grid("cloud.ply", 4, 0.0);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     def.init_count = 0.25;
@@ -251,7 +251,7 @@ static void init_counts(void **state)
 static void init_writes_world_coordinates(void **state)
 {
     (void)state;
-    const char *data = write_grid("far.ply", 2, 1.0, 4e6);
+    const char *data = write_grid("far.ply", 2, 4e6);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     def.max_depth = 0;
@@ -268,7 +268,7 @@ static void init_writes_world_coordinates(void **state)
 static void init_refuses(void **state)
 {
     (void)state;
-    const char *data = write_grid("cloud.ply", 2, 1.0, 0.0);
+    const char *data = write_grid("cloud.ply", 2, 0.0);
     const gbt_init_def good = gbt_init_def_default();
     enum { BAD = 9 };
     gbt_init_def bad[BAD];
@@ -302,7 +302,7 @@ static void init_refuses(void **state)
 static void init_without_memory(void **state)
 {
     (void)state;
-    const char *data = write_grid("cloud.ply", 3, 1.0, 0.0);
+    const char *data = write_grid("cloud.ply", 3, 0.0);
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     for (int mesh = 0; mesh < 2; mesh++) {

@@ -13,6 +13,8 @@ given = dict(zip(sys.argv[2::2], sys.argv[3::2]))
 work = os.path.dirname(os.path.abspath(__file__))
 if "-h" in sys.argv:
     print("  --SiftExtraction.use_gpu arg (=1)\n  --SiftMatching.use_gpu arg (=1)")
+    if what != "old":
+        print("  --ImageReader.single_camera_per_image arg (=0)\n  --Mapper.ba_global_function_tolerance arg (=0)")
     sys.exit(0)
 with open(work + "/calls", "a") as calls:
     calls.write(verb + "\n")
@@ -58,4 +60,6 @@ elif verb == "mapper":
         shutil.copytree(work + "/../" + scene + "/sparse/0", "%s/%d" % (models, i))
     if what == "garbage":
         open(models + "/0/images.bin", "wb").write(b"garbage that goes on and on" * 9)
+    if what == "cut":
+        os.truncate(models + "/1/points3D.bin", 100)
     print("Registering image #4 (5)")

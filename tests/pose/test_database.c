@@ -66,6 +66,28 @@ static void photos_are_found(void **state)
     database_close(d);
 }
 
+/* 1, NaN, -NaN, nothing. */
+static void positions_are_numbers(void **state)
+{
+    (void)state;
+    static const char *const priors =
+        "CREATE TABLE pose_priors(pose_prior_id INTEGER PRIMARY KEY, position BLOB, gravity BLOB);"
+        "INSERT INTO pose_priors(position) VALUES"
+        "(X'000000000000F03F000000000000F03F000000000000F03F'),"
+        "(X'000000000000F87F000000000000F87F000000000000F87F'),"
+        "(X'000000000000F8FF000000000000F8FF000000000000F8FF'), (NULL);";
+    sqlite3 *file;
+    database *d;
+    size_t count;
+    assert_int_equal(sqlite3_open(path, &file), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(file, priors, NULL, NULL, NULL), SQLITE_OK);
+    assert_int_equal(sqlite3_close(file), SQLITE_OK);
+    assert_ok(database_open(path, &d, NULL));
+    assert_ok(database_positions(d, &count, NULL));
+    assert_int_equal(count, 2 + 1); /* with those of `images` */
+    database_close(d);
+}
+
 static void check_refused(gbt_status status, const gbt_error *err)
 {
     assert_int_equal(status, GBT_ERR_IO);
@@ -98,8 +120,8 @@ static void damage_is_no_absence(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(photos_are_found), cmocka_unit_test(damage_is_no_absence), /* changes the file: the
-                                                                                       last */
+        cmocka_unit_test(photos_are_found), cmocka_unit_test(positions_are_numbers),
+        cmocka_unit_test(damage_is_no_absence), /* spoils the file: the last */
     };
     return cmocka_run_group_tests(tests, make_database, remove_database);
 }

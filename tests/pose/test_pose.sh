@@ -80,6 +80,10 @@ export FALSE_COLMAP=garbage
 says "a model that is none" 3 "^error: garbage/colmap/models/0/images.bin" pose "my photos" -o garbage
 [ ! -e garbage/sparse ]
 report $? "gives no data set" "$(ls garbage)"
+export FALSE_COLMAP=cut
+says "a model that is cut" 3 "^error: cut/colmap/models/1/points3D.bin" pose "my photos" -o cut
+export FALSE_COLMAP=
+says "is made again" 0 "^cut: 5 of 5 photos registered" pose "my photos" -o cut
 export FALSE_COLMAP=junk
 says "a database that is none" 3 "^error: junk/colmap/database.db: not a database of COLMAP" pose "my photos" -o junk
 export FALSE_COLMAP=
@@ -142,6 +146,12 @@ report $? "in place" "$(cat out err)"
 # ---- data within the folder of the photos: links to them are not photos more
 mkdir holding && cp "my photos"/*.png holding/ && PATH=$tools "$program" pose holding -o holding/data >out 2>err && says "the data in the photos' own folder" 0 "^holding/data: 5 of 5" pose holding -o holding/data
 
+# ---- masks in the photos' own folder
+mkdir masked && cp "my photos"/*.png masked/ && cp -R "my photos" masked/masks
+says "masks are no photos" 0 "^masked_data: 5 of 5" pose masked -o masked_data
+[ "$(grep -c '^warning: .*masked/masks: not used to find poses (copy it to masked_data/masks' err)" = 1 ] && [ ! -e masked_data/images/masks ]
+report $? "and where they belong" "$(cat err)"
+
 # ---- colmap as a script around the program: a signal reaches what it started
 mkdir wrapped && printf '#!/bin/sh\n"%s" "$@"\nexit $?\n' "$PWD/tools/colmap" >wrapped/colmap && chmod +x wrapped/colmap && rm -f tools/hanging tools/interrupted
 export FALSE_COLMAP=mapper-hangs
@@ -165,6 +175,27 @@ rm -r two/sparse two/colmap/features.done two/colmap/m*.done tools/arguments
 says "features once more" 0 '5 of 8 photos registered' pose both -o two
 grep -q 'existing_camera_id 1' tools/arguments
 report $? "with the camera that they had" "$(cat tools/arguments)"
+
+# ---- more cameras than eight, and options that an older colmap lacks
+mkdir many && python3 - <<'END'
+import struct, zlib
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+for width in range(64, 73):
+    rows = (b"\0" + bytes(range(width))) * 64
+    open("many/%04d.png" % (width - 64), "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, 64, 8, 0, 0, 0, 0)) +
+        chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+END
+for colmap in old new; do
+    rm -f tools/arguments
+    export FALSE_COLMAP=$colmap
+    says "photos of nine cameras, $colmap" 0 "features: 9 photos, SIMPLE_RADIAL, a camera for each" pose many -o "many_$colmap"
+    wanted=2
+    [ $colmap = old ] && wanted=0
+    [ "$(grep -c -e '^feature_extractor.* --ImageReader.single_camera_per_image 1' -e '^mapper.* --Mapper.ba_global_function_tolerance' tools/arguments)" = $wanted ]
+    report $? "with $wanted options that not all have" "$(cat tools/arguments)"
+done
+export FALSE_COLMAP=
 
 # ---- a film
 printf '#!/bin/sh\necho "Invalid data found when processing input" >&2\nexit 1\n' >tools/ffmpeg

@@ -64,16 +64,16 @@ static void sheet_shape(world *w)
     world_sheet(w, 1, 0, (const float[3]){-1, -1, 2}, (const float[3]){2, 0, 0}, (const float[3]){0, 2, 0},
                 0.3f);
 }
-static void torus_shape(world *w) { world_torus(w, 1, 0, (const float[3]){0, 0, 1}, 2, 0.5f, 200, 64); }
+static void torus_shape(world *w) { world_torus(w, 1, (const float[3]){0, 0, 1}, 2, 0.5f, 200, 64); }
 static void tube_shape(world *w)
 {
-    world_tube(w, 1, 0, (const float[3]){-3, 0, 1}, (const float[3]){3, 0, 1}, 0.25f, 64);
+    world_tube(w, 1, (const float[3]){-3, 0, 1}, (const float[3]){3, 0, 1}, 0.25f, 64);
 }
 static void cone_shape(world *w) { world_revolve(w, 1, 0, (const float[][2]){{2, 0}, {0, 1}}, 2, 100); }
 static float slope(float x, float y) { return 0.5f * x - 0.25f * y; }
 static void field_shape(world *w)
 {
-    world_field(w, 1, 0, (const float[2]){-2, -2}, (const float[2]){2, 2}, 8, slope);
+    world_field(w, 1, (const float[2]){-2, -2}, (const float[2]){2, 2}, 8, slope);
 }
 
 typedef struct shape_case {

@@ -168,7 +168,7 @@ static void field_list(const gaussians *g, const float *fields[GAUSSIANS_FIELD_C
 /* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths
    closer than float32 can tell. */
 static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
-                       size_t count, double depth_band)
+                       size_t count)
 {
     double T = 1, before = -1;
     for (size_t i = 0; i < count; i++) {
@@ -178,7 +178,7 @@ static bool is_in_band(const reference_scene *scene, const trace_settings *s, co
             return true;
         if (hits[i].alpha < (double)s->alpha_min)
             continue;
-        if (hits[i].t != before && hits[i].t - before < depth_band * hits[i].t)
+        if (hits[i].t != before && hits[i].t - before < 1e-6 * hits[i].t)
             return true;
         before = hits[i].t;
         T *= 1 - hits[i].alpha;
@@ -196,8 +196,7 @@ typedef struct figures {
     kernel_counters counters;
 } figures;
 
-static figures compare(const gaussians *g, const trace_settings *s, const ray_image *rays, uint64_t seed,
-                       double depth_band)
+static figures compare(const gaussians *g, const trace_settings *s, const ray_image *rays, uint64_t seed)
 {
     figures out = {.rays = ray_image_count(rays)};
     const size_t n = out.rays;
@@ -219,7 +218,7 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
             dir[k] = (double)rays->dir[3 * i + k];
         }
         assert_ok(reference_scene_ray_hits(&scene, &loose, origin, dir, &hits, &count, &capacity, NULL));
-        band[i] = is_in_band(&scene, s, hits, count, depth_band);
+        band[i] = is_in_band(&scene, s, hits, count);
         out.band += band[i];
         out.hits += count;
         for (size_t k = 3 * i; k < 3 * i + 3; k++) {
@@ -344,7 +343,7 @@ static void random_scenes(void **state)
         const gbt_camera camera = camera_at(rows[i].camera, (double[3]){0, 0, 0}, 37, 21, 40);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        const figures f = compare(&g, &s, &rays, i, 1e-6);
+        const figures f = compare(&g, &s, &rays, i);
         /* At 1:100 and 1:1000 the thin axis is 1e-3 and 1e-4 of the distance: rounding of coordinates alone
            moves every hit by that much more of a std-dev. */
         const float thin = rows[i].flatness;
@@ -397,7 +396,7 @@ static void one_order_for_sixteen_rays(void **state)
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
         s.packet_order = true;
-        const figures f = compare(&g, &s, &rays, i, 1e-6);
+        const figures f = compare(&g, &s, &rays, i);
         assert_figures(rows[i].name, &f, rows[i].flatness > 50 ? 5e-5 : 1e-5);
         assert_true(off_by_one_order(&g, &s, &rays) > 1e-3); /* an approximation */
         ray_image_free(&rays);
@@ -555,7 +554,7 @@ static void faces_of_a_cube(void **state)
         memcpy(camera.params, rows[i].params, sizeof rows[i].params);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        const figures f = compare(&g, &s, &rays, 130 + i, 1e-6);
+        const figures f = compare(&g, &s, &rays, 130 + i);
         assert_limits(rows[i].name, &f,
                       kernel == TRACE_LIST ? &(limits){132, 2e-5, 2.2e-6} : &(limits){100, 2e-5, 1e-5});
         trace_scene scene = {.kernel = TRACE_LIST};
@@ -589,7 +588,7 @@ static void rays_that_do_not_run_together(void **state)
         memcpy(camera.params, rows[i].params, sizeof rows[i].params);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        const figures f = compare(&g, &s, &rays, 30 + i, 1e-6);
+        const figures f = compare(&g, &s, &rays, 30 + i);
         assert_figures(rows[i].name, &f, 1e-5);
         ray_image_free(&rays);
     }
@@ -607,7 +606,7 @@ static void rays_that_do_not_run_together(void **state)
             dir[3 * i + k] = (float)d[k];
     }
     const ray_image rays = {.width = W, .height = H, .origin = origin, .dir = dir};
-    const figures f = compare(&g, &s, &rays, 42, 1e-6);
+    const figures f = compare(&g, &s, &rays, 42);
     assert_limits("every way", &f, &(limits){135, 2e-5, 8e-7});
     assert_true(f.counters.spilled_packets >= 16); /* of 20; those in the corners have few rays */
     gaussians_free(&g);
@@ -683,7 +682,7 @@ static void coincident_gaussians(void **state)
         const gbt_camera camera = camera_at((double[3]){1, 0.5, -6}, (double[3]){0, 0, 0}, 16, 12, 20);
         ray_image rays = {0};
         assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-        const figures f = compare(&g, &s, &rays, 50, 1e-6);
+        const figures f = compare(&g, &s, &rays, 50);
         const limits few = {113, 2e-5, 6e-6}, many = {109, 2e-5, 5e-5}; /* T: a product of 800 roundings */
         if (kernel == TRACE_LIST)
             assert_limits(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? &few : &many);
@@ -702,7 +701,7 @@ static void assert_copies(const char *name, const gaussians *g, const double cen
     const gbt_camera camera = camera_at(center, target, size, size, fov);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    const figures f = compare(g, &s, &rays, 60, 1e-6);
+    const figures f = compare(g, &s, &rays, 60);
     assert_figures(name, &f, 2e-5);
     ray_image_free(&rays);
 }
@@ -768,7 +767,7 @@ static void inside_of_many(void **state)
     const gbt_camera camera = camera_at((double[3]){4, 0.5, 0}, (double[3]){5, 0, 2}, 20, 18, 20);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    const figures f = compare(&g, &s, &rays, 61, 1e-6);
+    const figures f = compare(&g, &s, &rays, 61);
     assert_figures("inside of many", &f, 1e-5);
     ray_image_free(&rays);
     gaussians_free(&g);
@@ -819,7 +818,7 @@ static void sheets_that_end_behind_a_wall(void **state)
     const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0, 1}, 4, 4, 50);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    const figures f = compare(&g, &s, &rays, 91, 1e-6);
+    const figures f = compare(&g, &s, &rays, 91);
     assert_figures("behind a wall", &f, 2e-5);
     assert_int_equal(f.counters.spilled_packets, 0);
     ray_image_free(&rays);
@@ -909,7 +908,7 @@ static void the_last_row_is_near_on_few_rays(void **state)
     const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0.1933, 5}, 16, 16, 7.322);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    const figures f = compare(&g, &s, &rays, 62, 1e-6);
+    const figures f = compare(&g, &s, &rays, 62);
     assert_figures("late and near", &f, 5e-4);
     assert_int_equal(f.counters.spilled_packets, 0); /* forward */
     image d_rgb = random_gradient(&rays, 63);
@@ -1206,7 +1205,7 @@ static void peer_scene(void **state)
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
     const trace_settings s = trace_settings_default();
-    const figures f = compare(&g, &s, &rays, 2, 1e-6);
+    const figures f = compare(&g, &s, &rays, 2);
     assert_figures("peer match2k", &f, 1e-5);
     assert_true(f.hits > 10 * f.rays);
     ray_image_free(&rays);

@@ -237,28 +237,31 @@ static void what_is_no_pose_is_refused(void **state)
          "photo 0: no pose"},
     };
     scene s;
+    bool aligned;
     assert_ok(scene_load(tiny, NULL, &s, NULL));
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_error err = {0};
         write_text(in_root("poses.json"), cases[i].text);
-        assert_int_equal(pose_file_read(in_root("poses.json"), &s, &err), GBT_ERR_FORMAT);
+        assert_int_equal(pose_file_read(in_root("poses.json"), &s, &aligned, &err), GBT_ERR_FORMAT);
         if (strstr(err.text, cases[i].says) == NULL)
             fail_msg("wanted \"%s\", got: %s", cases[i].says, err.text);
     }
-    assert_ok(pose_file_write(&s, in_root("poses.json"), NULL));
+    assert_ok(pose_file_write(&s, false, in_root("poses.json"), NULL));
     gbt_camera first = s.views[0].camera;
     s.views[0].camera.center[1] += 1;
-    assert_ok(pose_file_read(in_root("poses.json"), &s, NULL));
+    assert_ok(pose_file_read(in_root("poses.json"), &s, &aligned, NULL));
+    assert_false(aligned);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12);
     s.views[0].name[0] = '\xdf'; /* names of other encodings than UTF-8 stay different */
     s.views[1].name[0] = '\xe4';
     snprintf(s.views[1].name + 1, strlen(s.views[1].name), "%s", s.views[0].name + 1);
     const gbt_camera second = s.views[1].camera;
-    assert_ok(pose_file_write(&s, in_root("poses.json"), NULL));
+    assert_ok(pose_file_write(&s, true, in_root("poses.json"), NULL));
     s.views[0].camera.center[1] += 1;
     s.views[1].camera.center[1] += 1;
-    assert_ok(pose_file_read(in_root("poses.json"), &s, NULL));
+    assert_ok(pose_file_read(in_root("poses.json"), &s, &aligned, NULL));
+    assert_true(aligned);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12 &&
                     fabs(s.views[1].camera.center[k] - second.center[k]) < 1e-12);

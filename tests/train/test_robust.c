@@ -873,6 +873,8 @@ static double score_of(const char *run, const char *data, gbt_train_def def)
     assert_int_equal(strncmp(json_string_value(json_object_get(metrics, "scored")),
                              def.exposure ? "right half" : "whole image", 10),
                      0);
+    assert_int_equal(strstr(json_string_value(json_object_get(metrics, "scored")), "aligned poses") != NULL,
+                     def.refine_poses);
     json_decref(metrics);
 
     trainer t; /* in passing and at the end: one protocol. Eval also knows the smallest pixel of each anchor
@@ -949,6 +951,11 @@ static void exposure_is_learned(void **state)
     json_decref(file);
 }
 
+static void count_unaligned(const gbt_event *event, void *context)
+{
+    *(int *)context += event->kind == GBT_EVENT_WARNING && strstr(event->text, "not aligned") != NULL;
+}
+
 /* Whoever opens a run has its sky and its poses. */
 static void sky_and_poses_are_scored(void **state)
 {
@@ -961,7 +968,16 @@ static void sky_and_poses_are_scored(void **state)
     score_of(in_root("sky"), tiny, def);
     def.background = GBT_BACKGROUND_CONSTANT;
     def.refine_poses = true;
+    int warned = 0;
+    gbt_listen(count_unaligned, &warned);
     score_of(in_root("refined"), tiny, def);
+    assert_int_equal(warned, 0);
+    def.stop_at_step = 3;
+    train_fails(tiny, in_root("refined half"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    const gbt_evaluate_def score = gbt_evaluate_def_default();
+    assert_ok(gbt_evaluate(in_root("refined half"), &score, NULL));
+    be_quiet();
+    assert_int_equal(warned, 1);
 }
 
 /* Interrupted or not, one thread or three. */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* report/layers.c -- one view, from points to the picture: what the model is made of. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "anchor/init.h"
@@ -11,6 +10,7 @@
 #include "render/ellipsoids.h"
 #include "report/image.h"
 #include "report/scene.h"
+#include "report/views.h"
 
 enum { SIDE_MAX = 640, CHECK_SOLIDS = 1 << 14 };
 
@@ -188,28 +188,22 @@ static void add_solids(text *out, const loaded_run *r, const gbt_camera *camera,
     mem_free(s.center);
 }
 
-static int compare_scores(const void *a, const void *b)
-{
-    const view_score *x = *(const view_score *const *)a, *y = *(const view_score *const *)b;
-    return (x->psnr > y->psnr) - (x->psnr < y->psnr);
-}
-
-/** The held-out view in the middle by PSNR: neither the best nor the worst of what there is; the first view
+/** The scored view in the middle by PSNR: neither the best nor the worst of what there is; the first view
     when none was held out. */
 static size_t choose_view(const loaded_run *r, const evaluation *e)
 {
     gbt_error ignored = {0};
-    const view_score **sorted = mem_alloc(e->view_count, sizeof *sorted, "views", &ignored);
-    size_t chosen = 0;
-    if (sorted != NULL && e->view_count > 0) {
+    size_t chosen = 0, scored = 0, shown[REPORT_MAX_VIEWS];
+    size_t *order = mem_alloc(e->view_count, sizeof *order, "views", &ignored);
+    if (order != NULL && e->view_count > 0) {
+        report_choose_views(e, shown, order);
         for (size_t i = 0; i < e->view_count; i++)
-            sorted[i] = &e->views[i];
-        qsort(sorted, e->view_count, sizeof *sorted, compare_scores);
+            scored += !isnan(e->views[i].psnr);
         for (size_t i = 0; i < r->scene.view_count; i++)
-            if (strcmp(r->scene.views[i].name, sorted[e->view_count / 2]->name) == 0)
+            if (strcmp(r->scene.views[i].name, e->views[order[scored / 2]].name) == 0)
                 chosen = i;
     }
-    mem_free(sorted);
+    mem_free(order);
     return chosen;
 }
 

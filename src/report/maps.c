@@ -270,7 +270,7 @@ static void add_ruler(text *out, const map *m)
                 m->height + 8, length, 16 + length, m->height + 16, ticks[1]);
 }
 
-void report_maps(text *out, const loaded_run *r, const evaluation *e)
+void report_scene(text *out, const loaded_run *r, const evaluation *e)
 {
     map maps[2];
     size_t held = 0;
@@ -278,7 +278,8 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
         return;
     for (size_t i = 0; i < r->scene.view_count; i++)
         held += r->scene.views[i].is_test;
-    text_add(out, "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of "
+    text_add(out, "<section id=\"scene\"><h2>The scene</h2>\n"
+                  "<p class=\"lead\">Where the cameras stood, over what they saw. The ruler is in units of "
                   "the data set; a held-out camera leads to its picture.</p>\n"
                   "<div class=\"grid2 maps\">\n");
     out->status = make_maps(r, maps, out->err);
@@ -303,5 +304,5 @@ void report_maps(text *out, const loaded_run *r, const evaluation *e)
         add_ruler(out, m);
         text_add(out, "</svg></figure>\n");
     }
-    text_add(out, "</div>\n");
+    text_add(out, "</div>\n</section>\n");
 }

@@ -12,10 +12,16 @@ document.querySelectorAll("pre").forEach(function (box) {
   button.type = "button";
   button.textContent = "Copy";
   button.addEventListener("click", function () {
-    navigator.clipboard.writeText(command).then(function () { button.textContent = "Copied"; });
+    navigator.clipboard.writeText(command).then(function () {
+      button.textContent = "Copied";
+      setTimeout(function () { button.textContent = "Copy"; }, 1200);
+    }, function () { prompt("Copy this:", command); });
   });
   box.appendChild(button);
 });
+
+// What was not measured comes last, in both orders.
+function numberOf(text, sign) { return text === undefined ? sign * Infinity : Number(text); }
 
 function sortChildren(parent, value, sign) {
   Array.from(parent.children).sort(function (a, b) {
@@ -28,21 +34,21 @@ const order = document.getElementById("order");
 if (order) {
   order.parentNode.hidden = false;
   order.addEventListener("change", function () {
-    const choice = order.value.split(" ");
-    sortChildren(document.querySelector(".views"), function (view) { return Number(view.dataset[choice[0]]); }, choice[1] === "up" ? 1 : -1);
+    const choice = order.value.split(" "), sign = choice[1] === "up" ? 1 : -1;
+    sortChildren(document.querySelector(".views"), function (view) { return numberOf(view.dataset[choice[0]], sign); }, sign);
   });
 }
 
 document.querySelectorAll("table.sortable th[data-sort]").forEach(function (head) {
   head.tabIndex = 0;
   function sort() {
-    const up = head.getAttribute("aria-sort") !== "ascending", column = head.cellIndex;
+    const up = head.getAttribute("aria-sort") !== "ascending", sign = up ? 1 : -1, column = head.cellIndex;
     head.parentNode.querySelectorAll("th").forEach(function (other) { other.removeAttribute("aria-sort"); });
     head.setAttribute("aria-sort", up ? "ascending" : "descending");
     sortChildren(head.closest("table").tBodies[0], function (row) {
       const cell = row.cells[column];
-      return head.dataset.sort === "text" ? cell.textContent : Number(cell.dataset.value);
-    }, up ? 1 : -1);
+      return head.dataset.sort === "text" ? cell.textContent : numberOf(cell.dataset.value, sign);
+    }, sign);
   }
   head.addEventListener("click", sort);
   head.addEventListener("keydown", function (event) { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); sort(); } });

@@ -128,11 +128,9 @@ static void add_head(text *out, const char *run, const evaluation *e, const json
     add_contents(out, has_scene, has_layers, has_studies);
     text_add(out, "</header>\n<main>\n");
     add_tiles(out, e, metrics);
-    text_add(out, "<pre class=\"card\">");
-    if (command != NULL)
-        text_add(out, "$ ");
-    text_escaped(out, command != NULL ? command : "command: n/a");
-    text_add(out, "</pre>\n");
+    text_add(out, command != NULL ? "<pre class=\"card\">$ " : "<p class=\"note\">command: ");
+    text_escaped(out, command);
+    text_add(out, command != NULL ? "</pre>\n" : "</p>\n");
 }
 
 gbt_status report_write(const char *run, const evaluation *e, const json_t *metrics, const report_more *more,
@@ -147,7 +145,7 @@ gbt_status report_write(const char *run, const evaluation *e, const json_t *metr
         report_scene(&place, open, e);
         report_layers(&layers, open, e);
     }
-    add_head(&out, run, e, metrics, open != NULL, layers.length > 0, studies.length > 0);
+    add_head(&out, run, e, metrics, place.length > 0, layers.length > 0, studies.length > 0);
     report_views(&out, run, e, metrics_text(metrics, "protocol"), metrics_text(metrics, "scored"));
     text_append(&out, &place);
     text_append(&out, &layers);

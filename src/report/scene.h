@@ -7,11 +7,9 @@
 #include "run/loaded_run.h"
 #include "report/text.h"
 
-/** The section "The scene": the two maps. `r` with its data set. */
-void report_scene(text *out, loaded_run *r, const evaluation *e);
-
-/** The two maps: cameras from above and from the side, held-out ones marked, over points and anchors. */
-void report_maps(text *out, const loaded_run *r, const evaluation *e);
+/** The section "The scene": cameras from above and from the side, held-out ones marked, over points and
+    anchors. `r` with its data set; nothing where that has no view. */
+void report_scene(text *out, const loaded_run *r, const evaluation *e);
 
 /** The section of one view as points, balls, anchors, Gaussians, render and photo, which it renders; nothing
     where no view is a pinhole's. */

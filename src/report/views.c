@@ -32,10 +32,13 @@ static int compare_psnr(const void *a, const void *b)
 size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
 {
     const size_t n = e->view_count, third = REPORT_MAX_VIEWS / 3;
+    size_t scored = 0;
     gbt_error ignored = {0};
     ranked *rank = mem_alloc(n, sizeof *rank, "views", &ignored);
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
         order[i] = i;
+        scored += !isnan(e->views[i].psnr);
+    }
     if (rank != NULL) { /* without memory the order is that of the data set */
         for (size_t i = 0; i < n; i++)
             rank[i] = (ranked){e->views[i].psnr, i};
@@ -48,10 +51,11 @@ size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
         memcpy(shown, order, n * sizeof *order);
         return n;
     }
+    const size_t end = scored > REPORT_MAX_VIEWS ? scored : REPORT_MAX_VIEWS; /* those behind have no score */
     for (size_t i = 0; i < third; i++) {
         shown[i] = order[i];
-        shown[third + i] = order[n / 2 - third / 2 + i];
-        shown[2 * third + i] = order[n - third + i];
+        shown[third + i] = order[end / 2 - third / 2 + i];
+        shown[2 * third + i] = order[end - third + i];
     }
     return REPORT_MAX_VIEWS;
 }
@@ -83,9 +87,10 @@ static void add_score(text *out, const char *name, double value, int decimals, c
     text_format(out, "</b>%s</span>", unit);
 }
 
-static void add_key(text *out, const char *name, double value, double absent)
+static void add_key(text *out, const char *name, double value)
 {
-    text_format(out, " data-%s=\"%.6f\"", name, isfinite(value) ? value : absent);
+    if (isfinite(value))
+        text_format(out, " data-%s=\"%.6f\"", name, value);
 }
 
 static void add_view(text *out, const evaluation *e, size_t index, size_t place, size_t most)
@@ -96,9 +101,9 @@ static void add_view(text *out, const evaluation *e, size_t index, size_t place,
     if (width == 0)
         report_picture_size(v->photo_path, &width, &height);
     text_format(out, "<figure class=\"view card\" id=\"view-%zu\" data-place=\"%zu\"", index, place);
-    add_key(out, "psnr", v->psnr, 1e6);
-    add_key(out, "ssim", v->ssim, 1e6);
-    add_key(out, "flip", v->flip, -1);
+    add_key(out, "psnr", v->psnr);
+    add_key(out, "ssim", v->ssim);
+    add_key(out, "flip", v->flip);
     text_format(out, " style=\"--ratio:%.4f\"><figcaption><h3>",
                 width > 0 && height > 0 ? (double)width / (double)height : 1.5);
     text_escaped(out, v->name);
@@ -146,7 +151,10 @@ static void add_link(text *out, const char *run, const char *path, const char *n
 
 static void add_cell(text *out, double value, int decimals)
 {
-    text_format(out, "<td data-value=\"%.9g\">", isfinite(value) ? value : -1e9);
+    if (isfinite(value))
+        text_format(out, "<td data-value=\"%.9g\">", value);
+    else
+        text_add(out, "<td>");
     if (decimals == 0)
         text_count(out, value);
     else
@@ -165,8 +173,10 @@ static void add_row(text *out, const char *run, const evaluation *e, size_t inde
     text_escaped(out, v->name);
     text_add(out, is_shown ? "</a></th>" : "</th>");
     add_cell(out, v->psnr, 2);
-    const double share = isfinite(v->psnr) && high > low ? (v->psnr - low) / (high - low) : 1;
-    text_format(out, "<i class=\"meter\" style=\"--share:%.0f%%\"></i></td>", 100 * fmin(fmax(share, 0), 1));
+    const double share = high > low ? (v->psnr - low) / (high - low) : 1;
+    if (isfinite(v->psnr))
+        text_format(out, "<i class=\"meter\" style=\"--share:%.0f%%\"></i>", 100 * fmin(fmax(share, 0), 1));
+    text_add(out, "</td>");
     add_cell(out, v->ssim, 4);
     text_add(out, "</td>");
     add_cell(out, v->flip, 4);
@@ -247,10 +257,12 @@ void report_views(text *out, const char *run, const evaluation *e, const char *p
                     " Shown are %d of %zu views: the %d worst, %d from the middle and the %d best by PSNR.",
                     REPORT_MAX_VIEWS, e->view_count, REPORT_MAX_VIEWS / 3, REPORT_MAX_VIEWS / 3,
                     REPORT_MAX_VIEWS / 3);
-    text_add(out, "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\"><option "
-                  "value=\"psnr up\">worst PSNR first</option><option value=\"psnr down\">best PSNR "
-                  "first</option><option value=\"ssim up\">worst SSIM first</option><option value=\"flip "
-                  "down\">worst FLIP first</option></select></label>");
+    text_add(
+        out,
+        "</p>\n<div class=\"bar-top\"><label hidden>Order <select id=\"order\" autocomplete=\"off\"><option "
+        "value=\"psnr up\">worst PSNR first</option><option value=\"psnr down\">best PSNR "
+        "first</option><option value=\"ssim up\">worst SSIM first</option><option value=\"flip "
+        "down\">worst FLIP first</option></select></label>");
     add_color_scale(out);
     text_format(out, "</div>\n<div class=\"views%s\">\n", are_tall(e, shown, count) ? " tall" : "");
     const size_t most =

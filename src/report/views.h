@@ -16,7 +16,7 @@ enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
 void report_views(text *out, const char *run, const evaluation *e, const char *protocol, const char *scored);
 
 /**
- * Which views to show, worst first (without a score: last).
+ * Which views to show, worst first; those without a score last, and only where there is room for them.
  *
  * @param shown [out] indices, [REPORT_MAX_VIEWS]
  * @param order [out] all indices, worst first, [view_count]

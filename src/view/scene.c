@@ -13,6 +13,8 @@
 #include "data/json_out.h"
 #include "view/studio.h"
 
+enum { SORTED_MAX = 100000 }; /* of more positions, evenly chosen ones say the extent */
+
 /* origin, target and up as a camera file has them. */
 static json_t *describe_pose(const gbt_camera *camera, const double origin[3])
 {
@@ -56,12 +58,13 @@ static void find_up(const loaded_run *r, double up[3])
         up[k] = length > 1e-3 ? sum[k] / length : k == 1 ? -1 : 0;
 }
 
-/* Coordinates of all positions along an axis, ascending. */
-static void sort_along(const float *position, size_t count, const double axis[3], float *sorted)
+/* Coordinates of `count` positions, `step` apart in memory, along an axis, ascending. */
+static void sort_along(const float *position, size_t count, size_t step, const double axis[3], float *sorted)
 {
-    for (size_t i = 0; i < count; i++)
-        sorted[i] = (float)(axis[0] * (double)position[3 * i] + axis[1] * (double)position[3 * i + 1] +
-                            axis[2] * (double)position[3 * i + 2]);
+    for (size_t i = 0; i < count; i++) {
+        const float *p = position + 3 * i * step;
+        sorted[i] = (float)(axis[0] * (double)p[0] + axis[1] * (double)p[1] + axis[2] * (double)p[2]);
+    }
     qsort(sorted, count, sizeof *sorted, compare_floats);
 }
 
@@ -69,7 +72,9 @@ static gbt_status find_extent(const loaded_run *r, extent *out, gbt_error *err)
 {
     static const double axes[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     const bool plain = r->cloud.count > 0;
-    const size_t count = plain ? r->cloud.count : r->model.anchors.count;
+    const size_t all = plain ? r->cloud.count : r->model.anchors.count;
+    const size_t step = all > SORTED_MAX ? (all + SORTED_MAX - 1) / SORTED_MAX : 1,
+                 count = (all + step - 1) / step;
     const float *position = plain ? r->cloud.mean : r->model.anchors.position;
     float *sorted = mem_calloc(count + 1, sizeof *sorted, "positions", err); /* one more: there may be none */
     if (sorted == NULL)
@@ -77,13 +82,13 @@ static gbt_status find_extent(const loaded_run *r, extent *out, gbt_error *err)
     const size_t last = count > 0 ? count - 1 : 0;
     out->size = 0;
     for (int k = 0; k < 3; k++) {
-        sort_along(position, count, axes[k], sorted);
+        sort_along(position, count, step, axes[k], sorted);
         const double low = (double)sorted[count / 4], high = (double)sorted[last - count / 4];
         out->center[k] = 0.5 * (low + high) + r->model.origin[k];
         out->size = fmax(out->size, high - low);
     }
     find_up(r, out->up);
-    sort_along(position, count, out->up, sorted);
+    sort_along(position, count, step, out->up, sorted);
     out->floor = (double)sorted[count / 20];
     for (int k = 0; k < 3; k++)
         out->floor += out->up[k] * r->model.origin[k];

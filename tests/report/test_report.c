@@ -405,6 +405,7 @@ static void bare_page(void **state)
     assert_int_equal(occurrences(page, "PIXELS"), c->has_pictures ? 3 * c->views : 0);
     assert_int_equal(occurrences(page, "class=\"missing\""), c->has_pictures ? 0 : 3 * c->views);
     assert_int_equal(occurrences(page, "class=\"compare\""), c->views);
+    assert_int_equal(occurrences(page, "command: n/a</p>"), !c->has_metrics);
     assert_true(occurrences(page, "n/a") > 0);
     free(page);
     json_decref(metrics);
@@ -513,6 +514,7 @@ static void scene_on_the_page(void **state)
         loaded_run *r = make_run(cases[i].lens);
         for (size_t k = 0; k < 2; k++)
             snprintf(e.views[k].name, sizeof e.views[k].name, "%s", r->scene.views[k].name);
+        e.views[1].psnr = (double)NAN;
         if (!cases[i].has_photos)
             remove_file("photo.png");
         if (!cases[i].has_points)
@@ -527,6 +529,7 @@ static void scene_on_the_page(void **state)
         assert_int_equal(occurrences(page, "href=\"PIXELS\""), 2);
         assert_int_equal(occurrences(page, "href=\"#layers\""), cases[i].layers > 0);
         assert_int_equal(occurrences(page, "<section id=\"layers\">"), cases[i].layers > 0);
+        assert_int_equal(occurrences(page, "One view, view_0"), cases[i].layers > 0); /* that has a score */
         assert_int_equal(occurrences(page, "<th>seed</th><td>&lt;7&gt;</td>"), 1);
         free(page);
         close_run(r);
@@ -686,7 +689,16 @@ static void many_views(void **state)
     size_t shown[REPORT_MAX_VIEWS], order[40];
     report_choose_views(&e, shown, order);
     assert_int_equal(order[39], 3);
-    assert_int_equal(shown[8], order[16]); /* 8 around the middle: places 16 to 23 of 40 */
+    assert_int_equal(shown[8], order[15]); /* 8 around the middle: places 15 to 22 of 39 */
+    assert_int_equal(shown[REPORT_MAX_VIEWS - 1], order[38]);
+    char *page = write_report(&e, NULL);
+    assert_int_equal(occurrences(page, "class=\"meter\""), 39);
+    assert_int_equal(occurrences(page, "data-psnr="), REPORT_MAX_VIEWS);
+    free(page);
+    for (size_t i = 0; i < 30; i++)
+        e.views[i].psnr = (double)NAN;
+    report_choose_views(&e, shown, order);
+    assert_memory_equal(shown, order, sizeof shown); /* all 10 that have a score, no view twice */
     free(e.views);
 }
 

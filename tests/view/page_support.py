@@ -13,6 +13,7 @@ import browser  # noqa: E402
 SKIPPED = 77
 STILL = "gbtrace.look.done && gbtrace.look.done.generation === gbtrace.pictures.generation && gbtrace.look.done.still && gbtrace.look.done.scale === 1"
 CAMERA = "JSON.stringify(gbtrace.camera.file(8, 8))"
+TWO_FRAMES = "new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame)).then(() => true)"
 program = sys.argv[1]
 checks = {"passed": 0, "failed": 0}
 

@@ -119,14 +119,29 @@ def comparing(page):
     page.wait(STILL)
     page.drag(middle(page, "#handle"), (40, 0))
     check("the slider slides", page.run("gbtrace.look.split") > 0.5 and page.run("gbtrace.camera.view") >= 0)
+    page.run("document.getElementById('handle').focus()")
+    for key, split in (("End", 1), ("ArrowDown", 0.98), ("Home", 0), ("ArrowUp", 0.02)):
+        page.press(key, key)
+        check("the slider by " + key, abs(page.run("gbtrace.look.split") - split) < 1e-6, str(page.run("gbtrace.look.split")))
+    check("keys of the slider move no camera", page.run("gbtrace.camera.view") >= 0)
     choose(page, "compare", "beside")
     page.wait(STILL)
     check("beside", not page.run("document.getElementById('photo-box').hidden"))
+    note = "document.getElementById('compare-note').textContent"
+    check("it is said that they have one size", "pixel for pixel" in page.run(note), page.run(note))
     page.run("(e => { e.value = 'equirectangular'; e.dispatchEvent(new Event('change')); })(document.getElementById('model'))")
     page.wait(STILL)
     shapes = [page.run(f"(b => b.width / b.height)(document.getElementById('{name}').getBoundingClientRect())") for name in ("photo", "render")]
+    check("but not of a panorama", page.run(note) == "", page.run(note))
     check("a panorama beside the photo: each in its shape", abs(shapes[0] - 4 / 3) < 0.02 and abs(shapes[1] - 2) < 0.02, str(shapes))
     choose(page, "compare", "off")
+    photo = "document.getElementById('photo').getContext('2d').getImageData(0, 0, 103, 77).data"
+    page.run(f"window.rawPhoto = {photo}; (e => {{ e.value = 'jpeg'; e.dispatchEvent(new Event('change')); }})(document.getElementById('transfer'))")
+    page.wait(f"{photo}.some((v, i) => v !== window.rawPhoto[i])")
+    far = page.run(f"{photo}.reduce((sum, v, i) => sum + Math.abs(v - window.rawPhoto[i]), 0) / window.rawPhoto.length")
+    check("a photo comes as pictures do", far < 16, str(far))
+    page.run("(e => { e.value = 'raw'; e.dispatchEvent(new Event('change')); })(document.getElementById('transfer'))")
+    page.wait(f"{photo}.every((v, i) => v === window.rawPhoto[i])")
     before = page.run("gbtrace.look.view")
     page.run("document.getElementById('next').click()")
     page.wait(f"gbtrace.look.view === {before + 1} && gbtrace.look.photo && {STILL}")
@@ -163,7 +178,7 @@ def from_another_device(work):
 
 
 def tests(work):
-    make_run(work, 96, 72)
+    make_run(work, 103, 77) # width by height times height is a little less than this width
     with opened(work + "/run") as page:
         first_picture(page, work)
         moving(page, work)

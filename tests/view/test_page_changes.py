@@ -8,7 +8,7 @@ import shutil
 import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from page_support import STILL, check, make_run, middle, opened, run_tests, start, stop  # noqa: E402
+from page_support import STILL, TWO_FRAMES, check, make_run, middle, opened, run_tests, start, stop  # noqa: E402
 
 PHOTO = "(c => String(c.getContext('2d').getImageData(0, 0, c.width, c.height).data))(document.getElementById('photo'))"
 
@@ -117,9 +117,11 @@ def before_the_first_model(work):
     with opened(work + "/run_new", until=f"{MESSAGE}.includes('not saved a model')") as page:
         for code, key in (("KeyW", "w"), ("KeyG", "g"), ("KeyG", "g"), ("KeyC", "c"), ("KeyR", "r"), ("KeyF", "f"), ("KeyH", "h"), ("BracketRight", "]")):
             page.key("keyDown", code, key)
-            page.run("new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame)).then(() => true)")
+            page.run(TWO_FRAMES)
             page.key("keyUp", code, key)
         page.drag(middle(page, "#stage"), (40, 10))
+        x, y = middle(page, "#stage")
+        page.mouse("mouseWheel", x, y, deltaX=0, deltaY=-200)
         page.double_click(*middle(page, "#stage"))
         for button in ("#copy", "#save", "#cameras", "#cameras"):
             page.run(f"window.prompt = () => null; document.querySelector('{button}').click()")
@@ -152,6 +154,31 @@ def another_log(work):
             check(run + ": pictures, and no message", page.run("document.getElementById('message').hidden"), page.run(MESSAGE))
 
 
+def a_score_in_the_log(work):
+    """Right after a row it has no means."""
+    shutil.copytree(work + "/run", work + "/scored")
+    with open(work + "/scored/log.csv", "r+", encoding="utf-8") as log:
+        names, *_, last = [line.rstrip("\n").split(",") for line in log]
+        known = {"test_psnr": "21.5", **{name: value for name, value in zip(names, last) if name in ("step", "seconds", "progress", "anchors")}}
+        log.write(",".join(known.get(name, "") for name in names) + "\n")
+    with opened(work + "/scored") as page:
+        page.wait("!document.getElementById('training-part').hidden")
+        now = page.run("document.getElementById('training-now').textContent")
+        check("the line has the last measured PSNR", " dB" in now and "NaN" not in now, now)
+        check("the score is a dot", page.run("document.querySelectorAll('#chart circle.test').length") == 1)
+
+
+def refused_scene(work):
+    """The server's line is shown until it answers again."""
+    with opened(work + "/run") as page:
+        page.run("""(ask => { window.ask = ask;
+            window.fetch = async (what, how) => what === 'scene' ? new Response('error: not now\\n', { status: 503 }) : ask(what, how); })(window.fetch);
+            gbtrace.training.version = -1""")
+        page.wait(f"{MESSAGE} === 'error: not now' && !document.getElementById('message').hidden")
+        page.run("window.fetch = window.ask")
+        page.wait(f"document.getElementById('message').hidden && {STILL}")
+
+
 def put(file, place):
     """At once, as training does."""
     shutil.copy(file, place + ".new")
@@ -170,7 +197,9 @@ def tests(work):
     other_pixels(work)
     no_photo(work)
     another_log(work)
+    a_score_in_the_log(work)
     busy(work)
+    refused_scene(work)
     before_the_first_model(work)
 
 

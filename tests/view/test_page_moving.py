@@ -11,7 +11,7 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import PageError  # noqa: E402
-from page_support import CAMERA, STILL, box, check, make_run, middle, opened, run_tests  # noqa: E402
+from page_support import CAMERA, STILL, TWO_FRAMES, box, check, make_run, middle, opened, run_tests  # noqa: E402
 
 TO_SUBJECT = "Math.hypot(...gbtrace.camera.eye.map((v, i) => v - gbtrace.look.subject.middle[i]))"
 
@@ -44,7 +44,9 @@ def keys_after_clicks(page):
     check("W A S D after the help", moves(page, "KeyD", "d"), page.run("document.activeElement.outerHTML"))
     page.run("document.getElementById('view').focus()")
     before = page.run(CAMERA)
-    page.press("KeyD", "d")
+    page.key("keyDown", "KeyD", "d")
+    page.run(TWO_FRAMES)
+    page.key("keyUp", "KeyD", "d")
     check("a list that was reached by the keyboard keeps its keys", page.run(CAMERA) == before)
     page.run("document.activeElement.blur()")
 
@@ -122,6 +124,26 @@ def fit_and_start(page):
     page.wait(STILL)
 
 
+def staying(page):
+    """What moves nothing does not leave the photo's camera."""
+    page.press("KeyH", "h")
+    page.wait(f"gbtrace.camera.view >= 0 && {STILL}")
+    wheel = "document.getElementById('stage').dispatchEvent(new WheelEvent('wheel', { deltaX: %d, deltaY: %d, bubbles: true, cancelable: true }))"
+    page.run(wheel % (200, 0))
+    check("a swipe to the side stays", page.run("gbtrace.camera.view") >= 0)
+    page.run(f"""(async () => {{
+        const send = kind => ['w', 's'].forEach(key => document.body.dispatchEvent(new KeyboardEvent(kind, {{ key, code: 'Key' + key.toUpperCase(), bubbles: true }})));
+        send('keydown');
+        await {TWO_FRAMES};
+        send('keyup'); }})()""")
+    check("W and S together stay", page.run("gbtrace.camera.view") >= 0)
+    page.run("gbtrace.camera.pivot = gbtrace.camera.eye.map((v, i) => v + 1e-5 * gbtrace.look.subject.radius * gbtrace.camera.forward[i])")
+    page.run(wheel % (0, -200))
+    check("the wheel at its end stays", page.run("gbtrace.camera.view") >= 0)
+    page.run(wheel % (0, 200))
+    check("and leaves where it moves", page.run("gbtrace.camera.view") == -1)
+
+
 def drawn(page):
     """How many points of the overlay are not empty."""
     return page.run("""(c => c.width && c.getContext('2d').getImageData(0, 0, c.width, c.height).data.filter((v, i) => i % 4 === 3 && v > 0).length)(
@@ -140,6 +162,14 @@ def lines(page):
     page.run("gbtrace.camera.zoom(3); gbtrace.camera.view = -1; gbtrace.changed()")
     page.wait(STILL)
     check("all cameras are in view from afar", page.run("gbtrace.lines.eyes.length") == 9, str(page.run("gbtrace.lines.eyes")))
+    fov = page.run("gbtrace.camera.fov")
+    page.run("gbtrace.camera.fov = 5; gbtrace.changed()")
+    page.wait(STILL)
+    width, height = box(page, "#lines")[2:]
+    eyes = page.run("gbtrace.lines.eyes")
+    check("no camera beside the picture can be clicked", len(eyes) < 9 and all(0 <= e["x"] <= width and 0 <= e["y"] <= height for e in eyes), str(eyes))
+    page.run(f"gbtrace.camera.fov = {fov}; gbtrace.changed()")
+    page.wait(STILL)
     eye = page.run("gbtrace.lines.eyes[4]")
     left, top, _, _ = box(page, "#lines")
     page.mouse("mouseMoved", left + eye["x"], top + eye["y"])
@@ -258,6 +288,7 @@ def tests(work):
         slow(page)
     with opened(work + "/run", dark=True) as page:
         fit_and_start(page)
+        staying(page)
         lines(page)
         dragging(page)
         sizes(page)

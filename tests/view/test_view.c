@@ -10,6 +10,7 @@
 #include <signal.h>
 
 #include "base/image.h"
+#include "data/gaussian_file.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/export.h"
 #include "gbtrace/view.h"
@@ -490,6 +491,34 @@ static void plain_gaussians_are_shown(void **state)
     close_viewer(&v, SIGINT);
 }
 
+/* More Gaussians than are looked at, along a slanted line. */
+static void the_extent_of_many_gaussians(void **state)
+{
+    (void)state;
+    enum { COUNT = 100002 };
+    const char *ply = in_root("many.ply");
+    gaussian_cloud c;
+    assert_ok(gaussian_cloud_alloc(&c, COUNT, NULL));
+    c.count = 0;
+    for (size_t i = 0; i < COUNT; i++) {
+        const double x = 4 * (double)i / (COUNT - 1);
+        gaussian_cloud_add(
+            &c, &(gaussian_row){.mean = {x, -x, 7}, .scale_log = {-5, -5, -5}, .quat = {1}, .opacity = 0.5});
+    }
+    assert_ok(gaussian_file_write(ply, &c, (const double[3]){0, 0, 0}, NULL));
+    gaussian_cloud_free(&c);
+    viewer v;
+    const int port = open_viewer(&v, ply);
+    json_t *there = get_json(port, "/scene"), *center = json_object_get(there, "center");
+    assert_true(number_of(there, "gaussians") == COUNT);
+    for (size_t k = 0; k < 3; k++)
+        assert_true(fabs(json_number_value(json_array_get(center, k)) - ((double[]){2, -2, 7})[k]) < 1e-3);
+    assert_true(fabs(number_of(there, "size") - 2) < 1e-3); /* the middle half */
+    assert_true(fabs(number_of(there, "floor") - 0.2) < 1e-3);
+    json_decref(there);
+    close_viewer(&v, SIGINT);
+}
+
 static void what_cannot_be_shown(void **state)
 {
     (void)state;
@@ -550,6 +579,7 @@ int main(void)
         cmocka_unit_test(newer_models_are_shown),
         cmocka_unit_test(a_result_folder_is_shown),
         cmocka_unit_test(plain_gaussians_are_shown),
+        cmocka_unit_test(the_extent_of_many_gaussians),
         cmocka_unit_test(what_cannot_be_shown),
         cmocka_unit_test(a_model_without_its_photos),
     };

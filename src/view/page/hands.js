@@ -68,7 +68,8 @@ function listenToPointers(stage, act, handle, picture) {
     stage.addEventListener("wheel", event => {
         event.preventDefault();
         const lines = event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1;
-        act.zoom(Math.exp(Math.max(-200, Math.min(200, event.deltaY * lines)) * 0.0015));
+        if (event.deltaY !== 0) // not a swipe to the side
+            act.zoom(Math.exp(Math.max(-200, Math.min(200, event.deltaY * lines)) * 0.0015));
     }, { passive: false });
     stage.addEventListener("dblclick", event => act.pick(event));
 
@@ -79,9 +80,10 @@ function listenToPointers(stage, act, handle, picture) {
     handle.addEventListener("pointerdown", event => handle.setPointerCapture(event.pointerId));
     handle.addEventListener("pointermove", event => handle.hasPointerCapture(event.pointerId) && splitAt(event));
     handle.addEventListener("keydown", event => {
-        const by = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.code];
+        const by = { ArrowLeft: -0.02, ArrowDown: -0.02, ArrowRight: 0.02, ArrowUp: 0.02, Home: -1, End: 1 }[event.code];
         if (by === undefined)
             return;
+        event.preventDefault();
         event.stopPropagation();
         act.split(Math.min(1, Math.max(0, Number(handle.getAttribute("aria-valuenow")) / 100 + by)));
     });

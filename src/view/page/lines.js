@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-// lines.js -- lines over the picture, by the camera that it was drawn with: the floor's grid, the axes, the photos' cameras.
+// lines.js -- lines over the picture: the floor's grid, the axes, the photos' cameras. By the camera file of what was drawn: at a photo's own
+// camera without its centre and distortion.
 import { add, cross, dot, length, mul, sub, unit } from "./camera.js";
 
 // Points of the scene to the picture of a camera file, in pixels: { z: how far in front, at: [x, y] }, or null where it is not seen.
@@ -126,7 +127,7 @@ export class Lines {
                 return;
             sorted[index === place.view ? "last" : view.test].push(...pyramid(view, size));
             const p = curve(lens, view.camera.origin, view.camera.origin, near)[0];
-            if (p)
+            if (p && p[0] >= 0 && p[0] < shot.width && p[1] >= 0 && p[1] < shot.height)
                 this.eyes.push({ index, x: p[0] * pixel, y: p[1] * pixel });
         });
         stroke(sorted[false], "#7db8ff", 1);

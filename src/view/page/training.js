@@ -74,7 +74,7 @@ export class Training {
     }
 
     describe(status) {
-        const row = this.rows[this.rows.length - 1];
+        const row = this.rows.findLast(r => r.train_psnr > 0); // a held-out score right after a row has a row without means
         this.part.hidden = row === undefined;
         if (row === undefined)
             return;
@@ -84,13 +84,14 @@ export class Training {
     }
 
     draw() {
-        const rows = this.rows.filter(r => r.train_psnr > 0), left = 26, right = 278, top = 6, bottom = 94;
+        const rows = this.rows.filter(r => r.train_psnr > 0), scored = this.rows.filter(r => r.test_psnr > 0);
+        const left = 26, right = 278, top = 6, bottom = 94;
         this.chart.replaceChildren();
         if (rows.length === 0)
             return;
-        const values = rows.flatMap(r => r.test_psnr > 0 ? [r.train_psnr, r.test_psnr] : [r.train_psnr]);
+        const values = rows.map(r => r.train_psnr).concat(scored.map(r => r.test_psnr));
         const least = values.reduce((a, b) => Math.min(a, b)), most = values.reduce((a, b) => Math.max(a, b));
-        const low = Math.floor(least), high = Math.max(low + 1, Math.ceil(most)), last = rows[rows.length - 1].step;
+        const low = Math.floor(least), high = Math.max(low + 1, Math.ceil(most)), last = this.rows[this.rows.length - 1].step;
         const x = step => left + (right - left) * step / last, y = psnr => bottom - (bottom - top) * (psnr - low) / (high - low);
         const put = (kind, attributes, text) => {
             const e = document.createElementNS("http://www.w3.org/2000/svg", kind);
@@ -114,9 +115,8 @@ export class Training {
         }
         put("polyline", { class: "train", points: points.join(" ") });
         if (rows.length === 1) // a line of one point shows nothing
-            put("circle", { class: "train", cx: x(last), cy: y(rows[0].train_psnr), r: 2 });
-        for (const r of rows)
-            if (r.test_psnr > 0)
-                put("circle", { class: "test", cx: x(r.step), cy: y(r.test_psnr), r: 3 });
+            put("circle", { class: "train", cx: x(rows[0].step), cy: y(rows[0].train_psnr), r: 2 });
+        for (const r of scored)
+            put("circle", { class: "test", cx: x(r.step), cy: y(r.test_psnr), r: 3 });
     }
 }

@@ -38,15 +38,15 @@ function rooms() {
     return { size: scaled(size).map(n => Math.max(1, n)), render: scaled([two && !below ? size[0] + gap : 0, below ? size[1] + gap : 0]) };
 }
 
-// Beside its photo a picture has the photo's size, so that pixels can be compared. Alone it fills the window: in the photo's shape where it has the
-// photo's camera, else all of it.
+// Beside its photo a picture has the photo's size, up to pixelsMax, so that pixels can be compared. Alone it fills the window: in the photo's
+// shape where it has the photo's camera, else all of it.
 function pictureSize() {
     const size = look.view < 0 ? "window" : byId("size").value, fills = size === "window" && compareMode() === "off"; // or "480x640", or a factor
     let [width, height] = fills ? rooms().size : size.includes("x") ? size.split("x").map(Number) : photoSize().map(n => n * (Number(size) || 1));
     const shape = camera.model === "equirectangular" ? 2 : fills && camera.view >= 0 ? camera.aspect : width / height;
     [width, height] = [Math.min(width, height * shape), Math.min(height, width / shape)];
     const fit = Math.min(1, sideMax / Math.max(width, height), Math.sqrt((fills ? windowPixelsMax : pixelsMax) / (width * height)));
-    return [Math.max(1, Math.floor(width * fit)), Math.max(1, Math.floor(height * fit))];
+    return [width, height].map(n => Math.max(1, Math.floor(n * fit + 1e-6))); // rounding may leave it just below a whole number
 }
 
 function fillSizes() {
@@ -205,7 +205,7 @@ const pictures = new Pictures(wanted, show, error => training.gone || fail(error
 
 function showControls() {
     const left = look.view >= 0 && look.noPhoto === "" && chosen("compare") !== "off" && compareMode() === "off", fov = camera.fovOf(...pictureSize());
-    const compares = compareMode() !== "off" && byId("size").value === "window";
+    const compares = compareMode() !== "off" && pictureSize().join() === photoSize().join();
     byId("compare-note").textContent = left ? "The camera has left the photo: R goes back." : compares ? "Of the photo's size, pixel for pixel." : look.noPhoto;
     byId("model").value = camera.view >= 0 ? "photo" : camera.model;
     byId("copy-note").hidden = camera.view < 0 || camera.model === "equirectangular";
@@ -232,24 +232,27 @@ function photoPixels(width, height) {
 }
 
 async function readPhoto(view) {
-    const response = await fetch(`photo?view=${view}&format=raw`);
+    const response = await fetch(`photo?view=${view}&format=${byId("transfer").value}`);
     if (!response.ok)
         throw new Error((await response.text()).trim());
-    const about = JSON.parse(response.headers.get("X-Picture"));
-    return new ImageData(new Uint8ClampedArray(await response.arrayBuffer()), about.width, about.height);
+    const about = JSON.parse(response.headers.get("X-Picture")), type = response.headers.get("Content-Type");
+    return new ImageData(await pixelsOf({ about, bytes: await response.arrayBuffer(), type }), about.width, about.height);
 }
 
 async function fetchPhoto(view) {
     const [photo, why] = await readPhoto(view).then(photo => [photo, ""], error => [null, `No photo: ${error.message.replace(/^error: /, "")}`]);
     if (view !== look.view)
         return;
-    const canvas = byId("photo");
+    const canvas = byId("photo"), mode = compareMode();
     look.photo = photo !== null ? canvas : null, look.noPhoto = why;
     if (photo !== null) {
         canvas.width = photo.width, canvas.height = photo.height;
         canvas.getContext("2d").putImageData(photo, 0, 0);
     }
-    changed();
+    if (compareMode() === "difference" || compareMode() !== mode)
+        return changed();
+    layout(); // the picture is the same
+    showControls();
 }
 
 // Whether two scenes have the same photo where one is looked at; its pose may be refined meanwhile.
@@ -313,7 +316,10 @@ async function statusChanged(status) {
         return fail(new Error("gbtrace view has ended; start it again to go on."));
     if (status.version === 0)
         return fail(new Error(status.note));
-    const scene = await (await fetch("scene")).json(), first = look.scene === null || !hasSamePhoto(look.scene, scene);
+    const response = await fetch("scene");
+    if (!response.ok)
+        throw new Error((await response.text()).trim());
+    const scene = await response.json(), first = look.scene === null || !hasSamePhoto(look.scene, scene);
     look.scene = scene;
     look.subject = findSubject(scene);
     byId("title").textContent = scene.input.replace(/\/+$/, "").split("/").pop() || scene.input;
@@ -331,8 +337,7 @@ async function statusChanged(status) {
         byId("view").value = look.view;
         if (look.view >= 0)
             fetchPhoto(look.view); // of the same name; it may be another one after all
-        else
-            changed();
+        changed();
     }
 }
 
@@ -405,7 +410,7 @@ const unitsPerPixel = () => camera.viewWidth(...pictureSize()) / byId("render").
 const radiansPerPixel = () => camera.fovOf(...pictureSize()) * Math.PI / 180 / byId("render").clientWidth;
 
 function fly(right, up, forward) { // half of the subject's radius in a second
-    if (look.subject === null)
+    if (look.subject === null || right === 0 && up === 0 && forward === 0) // W and S together
         return;
     const speed = 0.5 * look.subject.radius * 2 ** byId("speed").value;
     camera.move(right * speed, up * speed, forward * speed);
@@ -429,10 +434,13 @@ listen(byId("stage"), {
     around: (x, y) => { camera.orbit(radiansPerPixel() * x, radiansPerPixel() * y, camera.eye); moved(); },
     shift: (x, y) => { camera.move(-x * unitsPerPixel(), y * unitsPerPixel(), 0); moved(); },
     zoom: factor => {
+        if (look.subject === null || factor === 1)
+            return;
         const far = camera.distance() / look.subject.radius; // beyond these, rounding would hold it there
-        if (factor > 1 ? far < 1e6 : far > 1e-4)
+        if (factor > 1 ? far < 1e6 : far > 1e-4) {
             camera.zoom(factor);
-        moved();
+            moved();
+        }
     },
     split: share => { look.split = share; layout(); },
     fly, pick, click: clickAt, point: pointAt, keys,
@@ -464,6 +472,7 @@ for (const id of ["grid", "cameras"])
         if (look.about !== null)
             describe(look.about, look.done);
     });
+byId("transfer").addEventListener("change", () => look.view >= 0 && fetchPhoto(look.view));
 byId("speed").addEventListener("input", showControls);
 new ResizeObserver(() => look.subject !== null && changed()).observe(byId("stage"));
 function followPixelRatio() { // another screen, another number of pixels for the same stage
@@ -474,8 +483,6 @@ function followPixelRatio() { // another screen, another number of pixels for th
     }, { once: true });
 }
 followPixelRatio();
-if (words.get("transfer") === "jpeg")
-    byId("transfer").value = "jpeg";
 
 const rampData = new ImageData(256, 1);
 ramp.forEach((c, i) => rampData.data.set([...c, 255], 4 * i));

@@ -355,6 +355,12 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
 gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed,
                             scene_points *out, gbt_error *err)
 {
+    if (view_count < SEED_VIEWS_LEAST)
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "no sparse points, and %zu photos to train on (wanted at least %d to find points by; "
+            "photos that are held out do not count)",
+            view_count, SEED_VIEWS_LEAST);
     seeding s = {.view_count = view_count < SEED_VIEWS_MOST ? view_count : SEED_VIEWS_MOST, .seed = seed};
     gbt_status status = GBT_ERR_NO_MEMORY;
     s.views = mem_calloc(s.view_count, sizeof *s.views, "seed images", err);

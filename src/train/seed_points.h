@@ -8,6 +8,7 @@
 
 enum {
     SEED_FEW_PLACES = 128, /* points of a data set at fewer different places are too few */
+    SEED_VIEWS_LEAST = 3,  /* photos: a place counts that two others agree on */
     SEED_VIEWS_MOST = 512, /* photos that are looked at; of more, so many at even distances in their list */
     SEED_LONG_SIDE = 400   /* photos are halved until they are no longer than this */
 };
@@ -25,6 +26,8 @@ enum {
  *
  * @param source [in]  opened at the training resolution; left at its coarsest level in use
  * @param out    [in,out] scene_points without points; filled
+ * @return GBT_OK, GBT_ERR_FORMAT (fewer views than SEED_VIEWS_LEAST, or they agree nowhere), GBT_ERR_IO,
+ *         GBT_ERR_NO_MEMORY
  * Deterministic for a seed; parallel.
  */
 gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed,

@@ -802,6 +802,9 @@ static void points_are_made_where_there_are_none(void **state)
         photos_close(&p);
     }
     gbt_set_threads(before);
+    gbt_error too_few = {0};
+    assert_int_equal(seed_points_make(NULL, views, 2, 5, &made[0], &too_few), GBT_ERR_FORMAT);
+    assert_non_null(strstr(too_few.text, "and 2 photos to train on (wanted at least 3"));
     assert_true(made[0].count >= 100 && made[0].has_color);
     assert_int_equal(made[0].count, made[1].count);
     assert_memory_equal(made[0].position, made[1].position, 3 * made[0].count * sizeof(float));

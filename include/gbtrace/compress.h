@@ -31,7 +31,9 @@ gbt_compress_def gbt_compress_def_default(void);
  *
  * Steps of quantisation come from adjoint passes through the training views (photos are not needed); when the
  * data set is not there, from the model alone, with a line on stderr: the file is then some 5 to 40 % larger
- * at the same loss. What the file gives back is checked before it is written.
+ * at the same loss. Where one anchor is so far from the others that their positions would be rounded too
+ * much for that quality, the model is stored without loss, with a warning. What the file gives back is
+ * checked before it is written.
  *
  * A file that is already small is copied as it is, in a moment: always with `lossless`, else when it is
  * quantised and `quality` is not below the default (a file does not say at which quality it was made). A copy

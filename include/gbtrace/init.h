@@ -36,7 +36,7 @@ gbt_init_def gbt_init_def_default(void);
  * The PLY opens in any mesh viewer. Points: a vertex per anchor with x y z, radius, scale_0..scale_5
  * (std-devs, not logs), count (points in its ball), depth, red green blue. Mesh: an icosphere of 42 vertices
  * and 80 triangles per anchor with the ball's radius (the scale when it has none) and colour. Coordinates are
- * the data set's own.
+ * the data set's own, as doubles (as floats with GBT_INIT_VOXEL).
  *
  * @param data      [in]  data set folder or point cloud (.ply)
  * @param out_ply   [in]  written atomically

@@ -66,10 +66,11 @@ static gbt_status measure_row(loaded_run *r, const model_sensitivity *s, double 
     model_steps steps = {0};
     model back = {0};
     *row = (rate_row){.quality = quality};
-    gbt_status status = quality > 0 ? model_steps_at(&r->model, s, quality, &steps, err) : GBT_OK;
+    const bool coarse = quality > 0 && model_positions_fit(&r->model, s, quality); /* as gbt_compress() */
+    gbt_status status = coarse ? model_steps_at(&r->model, s, quality, &steps, err) : GBT_OK;
     const double start = clock_wall();
     if (status == GBT_OK)
-        status = model_save_coded(path, &r->model, quality > 0 ? &steps : NULL, &row->sizes, err);
+        status = model_save_coded(path, &r->model, coarse ? &steps : NULL, &row->sizes, err);
     const double coded = clock_wall();
     if (status == GBT_OK)
         status = model_load(path, &back, err);

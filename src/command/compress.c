@@ -30,6 +30,7 @@ typedef struct compression {
     model_sizes after;
     double probe_seconds, encode_seconds, decode_seconds;
     const char *steps_from;
+    bool lossless;
     bool kept; /* the file was small already: copied */
 } compression;
 
@@ -89,8 +90,16 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     model_steps steps = {0};
     gbt_status status = GBT_OK;
     const double start = clock_wall();
-    if (!def->lossless) {
+    c->lossless = def->lossless;
+    if (!c->lossless)
         status = has_views ? run_sensitivity(r, &s, err) : model_sensitivity_guess(&r->model, &s, err);
+    if (status == GBT_OK && !c->lossless && !model_positions_fit(&r->model, &s, def->quality)) {
+        log_warn("%s: an anchor is so far from the others that their positions would be rounded too much: "
+                 "the model is stored without loss, in a larger file (sparse points far outside the scene?)",
+                 out);
+        c->lossless = true;
+    }
+    if (!c->lossless) {
         if (status == GBT_OK)
             status = model_turn_features(&r->model, &s, err);
         if (status == GBT_OK)
@@ -100,7 +109,7 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     if (status == GBT_OK)
         status = check_stop(err);
     if (status == GBT_OK)
-        status = model_save_coded(out, &r->model, def->lossless ? NULL : &steps, &c->after, err);
+        status = model_save_coded(out, &r->model, c->lossless ? NULL : &steps, &c->after, err);
     const double coded = clock_wall();
     model back = {0};
     if (status == GBT_OK)
@@ -109,7 +118,7 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     c->encode_seconds = coded - probed;
     c->decode_seconds = clock_wall() - coded;
     c->anchors = r->model.anchors.count;
-    c->steps_from = def->lossless ? "lossless" : has_views ? "training views" : "the model alone";
+    c->steps_from = c->lossless ? "lossless" : has_views ? "training views" : "the model alone";
     model_free(&back);
     model_sensitivity_free(&s);
     model_steps_free(&steps);
@@ -212,7 +221,7 @@ static gbt_status save_report(const compression *c, const gbt_compress_def *def,
         "{s:i,s:I,s:I,s:I,s:f,s:s,s:o,s:o,s:f,s:f,s:f}", "schema", 1, "anchors", (json_int_t)c->anchors,
         "bytes_before", (json_int_t)c->before, "bytes", (json_int_t)c->after.total, "bytes_per_anchor",
         (double)c->after.total / count, "steps_from", c->steps_from, "quality",
-        def->lossless || c->kept ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds",
+        c->lossless || c->kept ? json_null() : json_real(def->quality), "parts", parts, "probe_seconds",
         c->probe_seconds, "encode_seconds", c->encode_seconds, "decode_seconds", c->decode_seconds);
     const gbt_status status = json_save(root, def->json, err);
     json_decref(root);

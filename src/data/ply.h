@@ -95,7 +95,7 @@ typedef struct ply_extra {
 /** What ply_write() writes; everything is borrowed for the call. Start from `= {0}`. */
 typedef struct ply_cloud {
     size_t vertex_count;
-    const float *position; /* [vertex_count][3], written as x y z */
+    const float *position; /* [vertex_count][3], written as x y z: doubles, or floats if the origin is 0 */
     double origin[3];      /* added to every position before it is written (see scene.origin) */
     size_t extra_count;
     const ply_extra *extras; /* written between z and red, in this order */

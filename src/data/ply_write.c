@@ -29,8 +29,15 @@ static gbt_status check_cloud(const char *path, const ply_cloud *cloud, gbt_erro
     return GBT_OK;
 }
 
+/* Far from 0 a float is too coarse: of 5 million it leaves halves. */
+static bool is_double(const ply_cloud *cloud)
+{
+    return cloud->origin[0] != 0 || cloud->origin[1] != 0 || cloud->origin[2] != 0;
+}
+
 static void put_header(sink *s, const ply_cloud *cloud)
 {
+    const char *type = is_double(cloud) ? "double" : "float";
     char line[128];
     sink_put_text(s, "ply\nformat binary_little_endian 1.0\n");
     if (cloud->comment != NULL) {
@@ -40,7 +47,8 @@ static void put_header(sink *s, const ply_cloud *cloud)
     }
     snprintf(line, sizeof line, "element vertex %zu\n", cloud->vertex_count);
     sink_put_text(s, line);
-    sink_put_text(s, "property float x\nproperty float y\nproperty float z\n");
+    snprintf(line, sizeof line, "property %s x\nproperty %s y\nproperty %s z\n", type, type, type);
+    sink_put_text(s, line);
     for (size_t i = 0; i < cloud->extra_count; i++) {
         snprintf(line, sizeof line, "property float %s\n", cloud->extras[i].name);
         sink_put_text(s, line);
@@ -66,8 +74,12 @@ gbt_status ply_write(const char *path, const ply_cloud *cloud, gbt_error *err)
     sink s = {.err = err};
     put_header(&s, cloud);
     for (size_t i = 0; i < cloud->vertex_count && s.status == GBT_OK; i++) {
-        for (size_t k = 0; k < 3; k++)
-            sink_put_f32(&s, (float)((double)cloud->position[3 * i + k] + cloud->origin[k]));
+        for (size_t k = 0; k < 3; k++) {
+            if (is_double(cloud))
+                sink_put_f64(&s, (double)cloud->position[3 * i + k] + cloud->origin[k]);
+            else
+                sink_put_f32(&s, cloud->position[3 * i + k]);
+        }
         for (size_t j = 0; j < cloud->extra_count; j++)
             sink_put_f32(&s, cloud->extras[j].values[i * cloud->extras[j].stride]);
         for (size_t k = 0; k < 3 && cloud->color != NULL; k++)

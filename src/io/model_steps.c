@@ -232,21 +232,36 @@ static gbt_status find_doublings(const model_sensitivity *s, model_steps *out, g
     return GBT_OK;
 }
 
+/* What all steps have in common at a quality. Uniform noise of one step has the variance 1/12. */
+static double noise_at(const anchors *a, double quality)
+{
+    return sqrt(12 * pow(10, -quality / 10) / ((double)channel_count(a) * fmax((double)a->count, 1)));
+}
+
+/* The smallest cell of positions: the farthest anchor is 2^20 of them away. */
+static double least_cell(const anchors *a)
+{
+    double side = 0;
+    for (size_t i = 0; i < a->count * 3; i++)
+        side = fmax(side, fabs((double)a->position[i] - (double)a->position[i % 3]));
+    return fmax(side, 1e-20) / (1 << 20);
+}
+
+bool model_positions_fit(const model *m, const model_sensitivity *s, double quality)
+{
+    return step_of(noise_at(&m->anchors, quality), s->position, 0, INFINITY) >= least_cell(&m->anchors);
+}
+
 gbt_status model_steps_at(const model *m, const model_sensitivity *s, double quality, model_steps *out,
                           gbt_error *err)
 {
     const anchors *a = &m->anchors;
-    const size_t channels = channel_count(a);
     if (!(quality > 0 && quality < 200))
         return base_fail(err, GBT_ERR_ARGUMENT, "quality: wanted 0 to 200 dB, got %g", quality);
     if (s->count != a->count)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "sensitivities of another model (wanted %zu anchors, got %zu)", a->count, s->count);
-    /* Uniform noise of one step has the variance 1/12. */
-    const double noise = sqrt(12 * pow(10, -quality / 10) / ((double)channels * fmax((double)a->count, 1)));
-    double side = 0;
-    for (size_t i = 0; i < a->count * 3; i++)
-        side = fmax(side, fabs((double)a->position[i] - (double)a->position[i % 3]));
+    const double noise = noise_at(a, quality), cell = least_cell(a);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
         const size_t width = anchors_width(a, f);
         const double unit =
@@ -255,7 +270,7 @@ gbt_status model_steps_at(const model *m, const model_sensitivity *s, double qua
             out->field[f][c] = (float)step_of(noise, f == ANCHOR_FEATURE ? s->feature[c][c] : s->field[f][c],
                                               unit / step_limits[f].divisor, unit * step_limits[f].most);
     }
-    out->position = step_of(noise, s->position, fmax(side, 1e-20) / (1 << 20), fmax(side, 1e-20) / 64);
+    out->position = step_of(noise, s->position, cell, cell * (1 << 14));
     return s->anchor != NULL ? find_doublings(s, out, err) : GBT_OK;
 }
 

@@ -89,8 +89,13 @@ typedef struct model_steps {
                           NULL: all 0 */
 } model_steps;
 
+/** Whether the 2^20 cells between the farthest anchors can be as small as a quality wants: not where one
+    anchor is very far from the others. */
+bool model_positions_fit(const model *m, const model_sensitivity *s, double quality);
+
 /**
- * The steps of a model at a quality; deterministic.
+ * The steps of a model at a quality; deterministic. Cells of positions are larger than wanted where
+ * model_positions_fit() says no.
  *
  * @param quality [in] dB, (0, 200): -10 log10 of the mean squared change of pictures to aim at
  * @param out     [out] start from {0}; free with model_steps_free()

@@ -7,15 +7,19 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "base/paged.h"
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "base/symmetric.h"
 #include "base/vec.h"
 
 enum {
     SAMPLES = 40000, /* pixels that are swept */
+    TRIED = 2000,    /* of these, around each distance that is tried */
     KEPT = 20000,
     KEPT_AT_LEAST = 1000, /* so many, however doubtful: a start that is better than none */
     NEIGHBORS = 4,
@@ -29,10 +33,13 @@ enum {
 /* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not
    next to it. */
 static const float agreement = 0.7f, lead = 0.05f;
+/* Mean squared sine of the angles between optical axes from which on they say where they meet (6 degrees). */
+static const double least_spread = 0.01;
 
 typedef struct candidate {
     float position[3], color[3];
     float doubt; /* 1 - correlation; more when other depths look as good; INFINITY: no point */
+    float depth;
     uint32_t index;
 } candidate;
 
@@ -53,10 +60,11 @@ typedef struct seeding {
 } seeding;
 
 /* Point nearest to all optical axes in the least-squares sense; the mean distance to it is the scene's
-   scale. */
-static void find_focus(const seed_view *views, size_t count, double focus[3], double *distance)
+   scale. False where the axes do not meet in front of the cameras: then the mean distance of the cameras to
+   their middle. */
+static bool find_scale(const seed_view *views, size_t count, double *distance)
 {
-    double a[3][4] = {{0}}, middle[3] = {0};
+    double a[3][4] = {{0}}, middle[3] = {0}, focus[3], spread[9], axes[9];
     for (size_t i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             middle[k] += views[i].camera.center[k] / (double)count;
@@ -69,8 +77,11 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
                 a[r][3] += p * (views[i].camera.center[c] - middle[c]);
             }
     }
+    for (int k = 0; k < 9; k++)
+        spread[k] = a[k / 3][k % 3] / (double)count;
+    symmetric_eigen(spread, axes, 3, 1e-15);
     for (int r = 0; r < 3; r++)
-        a[r][r] += 1e-6 * (double)count; /* parallel axes: stay near the cameras */
+        a[r][r] += 1e-6 * (double)count; /* parallel axes: the matrix can be inverted */
     for (int k = 0; k < 3; k++)          /* the matrix is positive definite: no pivoting needed */
         for (int r = 0; r < 3; r++) {
             if (r == k)
@@ -81,13 +92,20 @@ static void find_focus(const seed_view *views, size_t count, double focus[3], do
         }
     for (int k = 0; k < 3; k++)
         focus[k] = middle[k] + a[k][3] / a[k][k];
-    double sum = 0;
+    double sum = 0, sum_middle = 0;
+    size_t in_front = 0;
     for (size_t i = 0; i < count; i++) {
-        const double d[3] = {focus[0] - views[i].camera.center[0], focus[1] - views[i].camera.center[1],
-                             focus[2] - views[i].camera.center[2]};
+        const double *at = views[i].camera.center,
+                     d[3] = {focus[0] - at[0], focus[1] - at[1], focus[2] - at[2]},
+                     m[3] = {middle[0] - at[0], middle[1] - at[1], middle[2] - at[2]};
         sum += dvec_length(d);
+        sum_middle += dvec_length(m);
+        in_front += dvec_dot(d, views[i].camera.rotation + 6) > 0;
     }
+    const bool meet = fmin(fmin(spread[0], spread[4]), spread[8]) > least_spread && 2 * in_front > count;
+    sum = meet ? sum : sum_middle;
     *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
+    return meet;
 }
 
 /* Photos from places that are about a fifth of the distance away and look the same way: near enough to look
@@ -97,6 +115,7 @@ static void find_neighbors(seeding *s, double distance)
     for (size_t i = 0; i < s->view_count; i++) {
         seed_view *v = &s->views[i];
         double worst[NEIGHBORS];
+        v->neighbor_count = 0;
         for (size_t j = 0; j < s->view_count; j++) {
             const gbt_camera *a = &v->camera, *b = &s->views[j].camera;
             if (j == i || dvec_dot(a->rotation + 6, b->rotation + 6) < 0.7)
@@ -274,6 +293,7 @@ static void find_depth(const sweep *w, candidate *c)
     const double depth = depth_of(w->s, index);
     for (int k = 0; k < 3; k++)
         c->position[k] = (float)(w->start[k] + depth * w->ray[0][k]);
+    c->depth = (float)depth;
     c->doubt = 1 - score[best] + (rival > score[best] - lead ? 1.0f : 0.0f);
 }
 
@@ -295,6 +315,43 @@ static void seed_block(size_t block, size_t begin, size_t end, void *context)
         if (start_sweep(s, v, (double)x + 0.5, (double)y + 0.5, &w))
             find_depth(&w, c);
     }
+}
+
+static void sweep_pixels(seeding *s, size_t count, double distance)
+{
+    s->near = 0.2 * distance;
+    s->far = 6 * distance;
+    find_neighbors(s, distance);
+    parallel_blocks(count, BLOCK, seed_block, s);
+}
+
+/* How far the scene is where axes do not tell: of distances from 1/64 to 64 times `scale` the one around
+   which most pixels have a depth, then the median of these depths. What agrees best at an end of the depths
+   lies beyond them. */
+static double try_distances(seeding *s, double scale)
+{
+    float depth[TRIED];
+    double distance = scale;
+    size_t most = 0;
+    for (int power = -6; power <= 6; power += 2) {
+        size_t count = 0;
+        sweep_pixels(s, TRIED, ldexp(scale, power));
+        for (size_t i = 0; i < TRIED; i++) {
+            const candidate *c = &s->out[i];
+            if (c->doubt <= 1 - agreement && (double)c->depth > 1.005 * s->near &&
+                (double)c->depth < 0.8 * s->far)
+                depth[count++] = c->depth;
+        }
+        if (count <= most)
+            continue;
+        most = count;
+        qsort(depth, count, sizeof *depth, compare_floats);
+        distance = (double)depth[count / 2];
+    }
+    if (most < TRIED / 100)
+        log_warn("the photos look in parallel or outwards, and few places of them agree: how far the scene "
+                 "is is not known (wanted sparse points)");
+    return distance;
 }
 
 static int by_doubt(const void *a, const void *b)
@@ -360,6 +417,12 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
 gbt_status seed_points_make(photos *source, const size_t *views, size_t view_count, uint64_t seed,
                             scene_points *out, gbt_error *err)
 {
+    if (view_count < SEED_VIEWS_LEAST)
+        return base_fail(
+            err, GBT_ERR_FORMAT,
+            "no sparse points, and %zu photos to train on (wanted at least %d to find points by; "
+            "photos that are held out do not count)",
+            view_count, SEED_VIEWS_LEAST);
     seeding s = {.view_count = view_count < SEED_VIEWS_MOST ? view_count : SEED_VIEWS_MOST, .seed = seed};
     gbt_status status = GBT_ERR_NO_MEMORY;
     s.views = mem_calloc(s.view_count, sizeof *s.views, "seed images", err);
@@ -367,12 +430,10 @@ gbt_status seed_points_make(photos *source, const size_t *views, size_t view_cou
     if (s.views != NULL && s.out != NULL)
         status = read_views(&s, source, views, view_count, err);
     if (status == GBT_OK) {
-        double focus[3], distance;
-        find_focus(s.views, s.view_count, focus, &distance);
-        s.near = 0.2 * distance;
-        s.far = 6 * distance;
-        find_neighbors(&s, distance);
-        parallel_blocks(SAMPLES, BLOCK, seed_block, &s);
+        double distance;
+        if (!find_scale(s.views, s.view_count, &distance))
+            distance = try_distances(&s, distance);
+        sweep_pixels(&s, SAMPLES, distance);
         status = keep_best(&s, out, err);
     }
     for (size_t i = 0; s.views != NULL && i < s.view_count; i++) {

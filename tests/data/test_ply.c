@@ -274,7 +274,7 @@ static void written_cloud(void **state)
     const uint32_t faces[6] = {0, 1, 2, 2, 1, 0};
     const ply_cloud cloud = {.vertex_count = 3,
                              .position = position,
-                             .origin = {100, 0, -3},
+                             .origin = {5e8, 0, -0.3},
                              .extra_count = 2,
                              .extras = extras,
                              .color = color,
@@ -288,11 +288,11 @@ static void written_cloud(void **state)
     assert_ok(file_read(path, &bytes, &file.size, &assert_ok_err_));
     file.bytes = bytes;
     static const char header[] =
-        "ply\nformat binary_little_endian 1.0\ncomment made by a test\nelement vertex 3\n" XYZ
-        "property float radius\nproperty float level\nproperty uchar red\nproperty uchar green\nproperty "
-        "uchar blue\n"
+        "ply\nformat binary_little_endian 1.0\ncomment made by a test\nelement vertex 3\n"
+        "property double x\nproperty double y\nproperty double z\nproperty float radius\nproperty float "
+        "level\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n"
         "element face 2\nproperty list uchar int vertex_indices\nend_header\n";
-    assert_int_equal(file.size, strlen(header) + 3 * 23 + 2 * 13);
+    assert_int_equal(file.size, strlen(header) + 3 * 35 + 2 * 13);
     assert_memory_equal(bytes, header, strlen(header));
     raw_scene raw = {0};
     assert_ok(ply_read_points(&file, &raw, &assert_ok_err_));
@@ -304,7 +304,7 @@ static void written_cloud(void **state)
     assert_int_equal(bytes[file.size - 13], 3);
     assert_int_equal(bytes[file.size - 12], 2);
     float stored;
-    memcpy(&stored, bytes + strlen(header) + 23 + 12, 4);
+    memcpy(&stored, bytes + strlen(header) + 35 + 24, 4);
     assert_true(stored == 1.5f);
     raw_free(&raw);
     mem_free(bytes);

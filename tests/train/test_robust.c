@@ -1032,6 +1032,30 @@ static void making_small_stops_at_a_signal(void **state)
     assert_ok(gbt_compress(run, &small, in_root("small.gbt"), NULL, NULL));
 }
 
+static void a_far_anchor_does_not_move_the_others(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 3;
+    train_ok(tiny, in_root("stray"), &def);
+    for (int far = 0; far < 2; far++) {
+        const gbt_compress_def small = gbt_compress_def_default();
+        model m, back;
+        assert_ok(model_load(in_root("stray/model.gbt"), &m, NULL));
+        if (far == 1) {
+            m.anchors.position[0] += 1e6f * m.extent;
+            assert_ok(model_save(in_root("stray/model.gbt"), &m, NULL));
+        }
+        assert_ok(gbt_compress(in_root("stray"), &small, in_root("stray.gbt"), NULL, NULL));
+        assert_ok(model_load(in_root("stray.gbt"), &back, NULL));
+        const size_t size = 3 * m.anchors.count * sizeof(float);
+        assert_int_equal(back.anchors.count, m.anchors.count);
+        assert_true((memcmp(back.anchors.position, m.anchors.position, size) == 0) == (far == 1));
+        model_free(&m);
+        model_free(&back);
+    }
+}
+
 static void scoring_stops_at_a_signal(void **state)
 {
     (void)state;
@@ -1075,6 +1099,7 @@ int main(void)
         cmocka_unit_test(sky_and_poses_are_scored),
         cmocka_unit_test(exposure_resumes_to_the_same_bits),
         cmocka_unit_test(making_small_stops_at_a_signal),
+        cmocka_unit_test(a_far_anchor_does_not_move_the_others),
         cmocka_unit_test(scoring_stops_at_a_signal),
     };
     return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);

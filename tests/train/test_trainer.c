@@ -13,9 +13,12 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "base/compare.h"
+#include "base/image.h"
 #include "base/log.h"
 #include "base/paged.h"
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "data/photo_check.h"
 #include "data/photo_size.h"
 #include "io/model_file.h"
@@ -804,6 +807,9 @@ static void points_are_made_where_there_are_none(void **state)
         photos_close(&p);
     }
     gbt_set_threads(before);
+    gbt_error too_few = {0};
+    assert_int_equal(seed_points_make(NULL, views, 2, 5, &made[0], &too_few), GBT_ERR_FORMAT);
+    assert_non_null(strstr(too_few.text, "and 2 photos to train on (wanted at least 3"));
     assert_true(made[0].count >= 100 && made[0].has_color);
     assert_int_equal(made[0].count, made[1].count);
     assert_memory_equal(made[0].position, made[1].position, 3 * made[0].count * sizeof(float));
@@ -844,6 +850,73 @@ static void points_are_made_where_there_are_none(void **state)
     on.resume = true;
     train_ok(folder, in_root("made2"), &on);
     assert_same_file(in_root("made/model.gbt"), in_root("made2/model.gbt"));
+}
+
+/* Smooth noise. */
+static float wall_color(double x, double y)
+{
+    const double u = 4 * x + 100, v = 4 * y + 100;
+    const uint64_t i = (uint64_t)u, j = (uint64_t)v;
+    const float fx = (float)(u - (double)i), fy = (float)(v - (double)j);
+    return (1 - fy) * ((1 - fx) * rng_uniform(9, j, i) + fx * rng_uniform(9, j, i + 1)) +
+           fy * ((1 - fx) * rng_uniform(9, j + 1, i) + fx * rng_uniform(9, j + 1, i + 1));
+}
+
+enum { WALL_VIEWS = 12, WALL_DISTANCE = 6 };
+
+/* Photos of a wall from a grid of cameras that all look straight at it. */
+static void write_wall(void)
+{
+    enum { WIDTH = 64, HEIGHT = 48, FOCAL = 64 };
+    image photo;
+    assert_ok(image_alloc(&photo, WIDTH, HEIGHT, 3, NULL));
+    assert_ok(file_make_folder(in_root("wall"), NULL));
+    FILE *file = fopen(in_root("wall/transforms.json"), "w");
+    assert_non_null(file);
+    fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %d, \"fl_y\": %d, \"cx\": %d, \"cy\": %d, \"frames\": [",
+            WIDTH, HEIGHT, FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2);
+    for (int view = 0; view < WALL_VIEWS; view++) {
+        const double x = 0.3 * (view % 4), y = 0.3 * (view / 4), step = (double)WALL_DISTANCE / FOCAL;
+        for (int i = 0; i < 3 * WIDTH * HEIGHT; i++)
+            photo.pixels[i] = wall_color(x + (i / 3 % WIDTH + 0.5 - WIDTH / 2) * step,
+                                         y + (i / 3 / WIDTH + 0.5 - HEIGHT / 2) * step);
+        assert_ok(image_write(in_root("wall/%d.png", view), &photo, NULL));
+        fprintf(file,
+                "%s{\"file_path\": \"%d.png\", \"transform_matrix\": [[1, 0, 0, %g], [0, -1, 0, %g], "
+                "[0, 0, -1, 0], [0, 0, 0, 1]]}",
+                view > 0 ? ", " : "", view, x, y);
+    }
+    fprintf(file, "]}\n");
+    assert_int_equal(fclose(file), 0);
+    image_free(&photo);
+}
+
+/* The spread of these cameras is a fifteenth of the distance. */
+static void points_are_made_where_axes_do_not_meet(void **state)
+{
+    (void)state;
+    write_wall();
+    scene s;
+    photos p;
+    scene_points made = {0};
+    size_t views[WALL_VIEWS];
+    const scene_split split = {.kind = SCENE_SPLIT_NONE};
+    assert_ok(scene_load(in_root("wall"), &split, &s, NULL));
+    assert_int_equal(s.view_count, WALL_VIEWS);
+    for (size_t i = 0; i < WALL_VIEWS; i++)
+        views[i] = i;
+    assert_ok(photos_open(&p, &s, 1, NULL));
+    assert_ok(seed_points_make(&p, views, WALL_VIEWS, 5, &made, NULL));
+    photos_close(&p);
+    for (size_t i = 0; i < made.count; i++) /* the cameras stand at z = 0 */
+        made.position[i] = made.position[3 * i + 2];
+    qsort(made.position, made.count, sizeof *made.position, compare_floats);
+    const double depth = (double)made.position[made.count / 2];
+    if (!(made.count >= 1000 && fabs(depth / WALL_DISTANCE - 1) < 0.1))
+        fail_msg("%zu points, half of them nearer than %g", made.count, depth);
+    mem_free(made.position);
+    mem_free(made.color);
+    scene_free(&s);
 }
 
 /* ---- hostile surroundings ---- */
@@ -1963,6 +2036,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(new_geometry_begins_at_its_own_pace),
         cmocka_unit_test(moments_follow_their_rows),
         cmocka_unit_test(points_are_made_where_there_are_none),
+        cmocka_unit_test(points_are_made_where_axes_do_not_meet),
         cmocka_unit_test(closed_folders_are_told_first),
         cmocka_unit_test(data_without_training_photos_is_refused),
         cmocka_unit_test(validation_needs_no_held_out_photo),

@@ -20,14 +20,11 @@ enum {
  * Make points by plane sweep (Collins 1996).
  *
  * Random pixels of the photos (SEED_VIEWS_MOST, SEED_LONG_SIDE) are swept through 96 depths around the point
- * where the cameras' axes meet; a depth counts by the normalised correlation of 5 x 5 pixels with up to four
- * neighbouring photos, the better half of them. Pixels whose best depth is good and beats all others become
- * points; with few of these, the next best up to 1,000. Pixels that do not count
- * (photos_valid()) are in none of the 5 x 5.
  * where the cameras' axes meet; where these are nearly parallel, or meet behind the cameras, around the
  * distance at which most places of 2,000 pixels agree, with a warning if few do. A depth counts by the
  * normalised correlation of 5 x 5 pixels with up to four neighbouring photos, the better half of them. Pixels
  * whose best depth is good and beats all others become points; with few of these, the next best up to 1,000.
+ * Pixels that do not count (photos_valid()) are in none of the 5 x 5.
  *
  * @param source [in]  opened at the training resolution; left at its coarsest level in use
  * @param out    [in,out] scene_points without points; filled

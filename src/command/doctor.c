@@ -112,7 +112,7 @@ static void check_memory(gbt_diagnosis *d, const machine *m)
                  (double)m->memory_limit_bytes / 1e9);
     if (usable < memory_warn)
         advise(c, usable < memory_fail ? GBT_CHECK_FAIL : GBT_CHECK_WARN,
-               "train with --downscale 2 or more, or make room");
+               "train with downscale 2 or more, or make room");
 }
 
 static void check_libraries(gbt_diagnosis *d)

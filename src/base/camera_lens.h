@@ -17,6 +17,7 @@ typedef struct camera_lens {
     bool extra_last; /* extra terms are taken at the radially distorted point, not at the undistorted one */
     double numerator[LENS_NUMERATOR]; /* radial factor N(x) / D(x), x = squared radius, constant term 1 */
     double denominator[LENS_DENOMINATOR];
+    int numerator_count, denominator_count; /* terms up to the last that is not 0, when `radial` or `extra` */
     double tangent_x, tangent_y; /* x += tx (r2 + 2 x x) + 2 ty x y; y += ty (r2 + 2 y y) + 2 tx x y */
     double prism[4];             /* x += s0 r2 + s1 r4; y += s2 r2 + s3 r4 */
     double radius_max;           /* undistorted radius up to which the radial part is increasing */

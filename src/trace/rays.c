@@ -72,13 +72,6 @@ static void orthographic_row(const ray_job *job, const camera_pose *at, int row,
         }
 }
 
-static void unproject_row(const ray_job *job, int row, double *dir)
-{
-    for (int i = 0; i < job->shot->camera.width; i++, dir += 3)
-        if (!camera_lens_unproject(&job->lens, i + 0.5, row + 0.5, dir))
-            memset(dir, 0, 3 * sizeof *dir);
-}
-
 static void round3(const double from[3], float to[3])
 {
     to[0] = (float)from[0];
@@ -177,8 +170,10 @@ static void unproject_rows(size_t block, size_t begin, size_t end, void *context
 {
     const ray_job *job = context;
     (void)block;
+    const int width = job->shot->camera.width;
     for (size_t row = begin; row < end; row++)
-        unproject_row(job, (int)row, job->lens_dir + 3 * row * (size_t)job->shot->camera.width);
+        camera_lens_unproject_row(&job->lens, (double)row + 0.5, width,
+                                  job->lens_dir + 3 * row * (size_t)width);
 }
 
 static void make_rows(size_t block, size_t begin, size_t end, void *context)

@@ -53,9 +53,9 @@ static double beyond_range(const far_views *f)
     const frame *drawn = &f->t.views[0].frame;
     double worst = 0;
     for (size_t i = 0; i < drawn->visible_count; i++) {
-        float input[DECODE_TILE * INPUT_STRIDE];
-        decode_inputs(&f->t.anchors, d, drawn->eye, drawn->visible + i, 1, input);
-        const double seen = (double)input[INPUT_COUNT - 1];
+        float view[VIEW_COUNT];
+        decode_views(&f->t.anchors, d, drawn->eye, drawn->visible + i, 1, view);
+        const double seen = (double)view[VIEW_COUNT - 1];
         worst = fmax(worst, fmax(0.5 * (double)d->distance_min / seen, seen / (2 * (double)d->distance_max)));
     }
     return worst <= 1 + 1e-6 ? 0 : worst;

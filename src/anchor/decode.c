@@ -6,8 +6,8 @@
                             (kept for the adjoint)
 
    Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
-   those straight into place. Inputs and hidden layers are computed again for each pass, and for the adjoint:
-   they take less time to compute than to write and to read back. */
+   those straight into place. Inputs, but for directions and distances, and hidden layers are computed again
+   for each pass, and for the adjoint: they take less time to compute than to write and to read back. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -38,10 +38,11 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
     const size_t rows = end - begin, tiled = decode_tiled(rows), offsets = job->layout.offset_count;
-    float *alpha = tape->alpha + begin * offsets;
+    float *alpha = tape->alpha + begin * offsets, *view = tape->view + begin * VIEW_COUNT;
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * ANCHOR_HIDDEN_DIM],
         logits[DECODE_CHUNK * ALPHA_STRIDE];
-    decode_inputs(job->a, job->d, tape->camera, tape->visible + begin, rows, input);
+    decode_views(job->a, job->d, tape->camera, tape->visible + begin, rows, view);
+    decode_inputs(job->a, tape->visible + begin, view, rows, input);
     decode_hidden(job->kernels, &job->weights, input, tiled, 0, 1, hidden);
     job->kernels->product(&(dense_product){.m = tiled,
                                            .n = ALPHA_STRIDE,
@@ -142,13 +143,15 @@ static void emit_rows(const forward_job *job, size_t begin)
     enum { HIDDEN = (HEAD_COUNT - 1) * ANCHOR_HIDDEN_DIM };
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN],
         shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
-        extent[DECODE_CHUNK * 6];
+        extent[DECODE_CHUNK * 6], view[DECODE_CHUNK * VIEW_COUNT];
     uint16_t row_of[CHUNK_SLOTS];
     uint32_t anchor[DECODE_CHUNK];
     float *const logits[2] = {shape, color};
-    for (size_t r = 0; r < rows; r++)
+    for (size_t r = 0; r < rows; r++) {
         anchor[r] = tape->visible[row[r]];
-    decode_inputs(job->a, job->d, tape->camera, anchor, rows, input);
+        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)row[r] * VIEW_COUNT, VIEW_COUNT * sizeof *view);
+    }
+    decode_inputs(job->a, anchor, view, rows, input);
     decode_hidden(job->kernels, &job->weights, input, tiled, 1, HEAD_COUNT, hidden);
     for (int head = 1; head <= 2; head++) {
         const size_t stride = job->layout.out_stride[head];
@@ -213,14 +216,15 @@ static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_erro
     if (rows <= tape->capacity && tape->alpha != NULL)
         return GBT_OK;
     const size_t capacity = decode_tiled(rows + rows / 4);
-    float *block = /* one owner (alpha), two arrays */
-        mem_alloc(capacity, (ALPHA_STRIDE + 1) * sizeof *block, "decode tape", err);
+    float *block = /* one owner (alpha), three arrays */
+        mem_alloc(capacity, (ALPHA_STRIDE + 1 + VIEW_COUNT) * sizeof *block, "decode tape", err);
     if (block == NULL)
         return GBT_ERR_NO_MEMORY;
     mem_free(tape->alpha);
     tape->capacity = capacity;
     tape->alpha = block;
     tape->opacity_sum = tape->alpha + capacity * ALPHA_STRIDE;
+    tape->view = tape->opacity_sum + capacity;
     return GBT_OK;
 }
 

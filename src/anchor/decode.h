@@ -16,6 +16,7 @@ typedef struct decode_tape {
     uint32_t *row;           /* internal: the visible rows that have Gaussians, those of a chunk together */
     uint32_t *filled;        /* internal: how many there are in each chunk */
     float camera[3];         /* internal: the camera's centre */
+    float *view;             /* internal: direction and distance, or 0, of each visible anchor */
     float *output; /* internal: activations of the kept Gaussians, one array per field of `output_stride`
                       floats */
     size_t output_stride;

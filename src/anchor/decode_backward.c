@@ -154,13 +154,15 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
     const size_t chunk = begin / DECODE_CHUNK, tiled = decode_tiled(rows);
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN_STRIDE],
         d_hidden[DECODE_CHUNK * HIDDEN_STRIDE], d_out[DECODE_CHUNK * OUT_WIDTH_MAX],
-        d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM], extent[DECODE_CHUNK * 6], d_scale_log[DECODE_CHUNK * 6];
+        d_feature[DECODE_CHUNK * ANCHOR_FEATURE_DIM], extent[DECODE_CHUNK * 6], d_scale_log[DECODE_CHUNK * 6],
+        view[DECODE_CHUNK * VIEW_COUNT];
     uint32_t anchor[DECODE_CHUNK], target[DECODE_CHUNK];
     for (size_t r = 0; r < rows; r++) {
         const uint32_t row = tape->row[begin + r];
         anchor[r] = tape->visible[row];
         target[r] = job->packed ? row : anchor[r];
         memcpy(extent + r * 6, job->a->scale_log + (size_t)anchor[r] * 6, 6 * sizeof *extent);
+        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)row * VIEW_COUNT, VIEW_COUNT * sizeof *view);
     }
     job->kernels->exp(extent, rows * 6);
     memset(d_out, 0, tiled * job->layout.out_width * sizeof *d_out);
@@ -179,7 +181,7 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
                          .d_offset = job->d_anchors != NULL ? job->d_anchors->offset : NULL},
         tape->first[chunk], tape->first[chunk + 1]);
 
-    decode_inputs(job->a, job->d, tape->camera, anchor, rows, input);
+    decode_inputs(job->a, anchor, view, rows, input);
     decode_hidden(job->kernels, &job->weights, input, tiled, 0, HEAD_COUNT, hidden);
     hidden_backward(job, hidden, tiled, d_out, d_hidden);
     if (job->d_anchors == NULL) {

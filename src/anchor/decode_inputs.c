@@ -15,8 +15,8 @@ static double cut(double x, double low, double high)
 
 /* Directions and distances in double: exact differences for any finite input, no overflow of the squares, the
    same bits on every machine. */
-FASTEST_CLONE void decode_inputs(const anchors *a, const decoder *d, const float camera[3],
-                                 const uint32_t *which, size_t rows, float *input)
+FASTEST_CLONE void decode_views(const anchors *a, const decoder *d, const float camera[3],
+                                const uint32_t *which, size_t rows, float *view)
 {
     double offset[3][DECODE_CHUNK], distance[DECODE_CHUNK];
     for (size_t r = 0; r < rows; r++) {
@@ -34,12 +34,19 @@ FASTEST_CLONE void decode_inputs(const anchors *a, const decoder *d, const float
     }
     const double low = 0.5 * (double)d->distance_min, high = fmin(2.0 * (double)d->distance_max, 1e18);
     for (size_t r = 0; r < rows; r++) {
+        for (int c = 0; c < 3; c++)
+            view[r * VIEW_COUNT + c] = (float)offset[c][r];
+        view[r * VIEW_COUNT + 3] =
+            d->has_distance ? (float)cut(distance[r] * (double)d->distance_scale, low, high) : 0.0f;
+    }
+}
+
+void decode_inputs(const anchors *a, const uint32_t *which, const float *view, size_t rows, float *input)
+{
+    for (size_t r = 0; r < rows; r++) {
         float *row = input + r * INPUT_STRIDE;
         memcpy(row, a->feature + (size_t)which[r] * ANCHOR_FEATURE_DIM, ANCHOR_FEATURE_DIM * sizeof *row);
-        for (int c = 0; c < 3; c++)
-            row[ANCHOR_FEATURE_DIM + c] = (float)offset[c][r];
-        row[ANCHOR_FEATURE_DIM + 3] =
-            d->has_distance ? (float)cut(distance[r] * (double)d->distance_scale, low, high) : 0.0f;
+        memcpy(row + ANCHOR_FEATURE_DIM, view + r * VIEW_COUNT, VIEW_COUNT * sizeof *row);
         row[INPUT_ONE] = 1.0f;
         for (int i = INPUT_ONE + 1; i < INPUT_STRIDE; i++)
             row[i] = 0.0f;

@@ -17,8 +17,8 @@ enum {
     DECODE_CHUNK = 120,
     DECODE_GRAIN = 240,
     DECODE_TILE = 10,
-    INPUT_COUNT = ANCHOR_FEATURE_DIM + 4, /* feature, direction, distance; the distance is 0 when the networks
-                                             do not have it */
+    VIEW_COUNT = 4, /* direction, distance; the distance is 0 when the networks do not have it */
+    INPUT_COUNT = ANCHOR_FEATURE_DIM + VIEW_COUNT,
     INPUT_ONE = INPUT_COUNT, /* a column of ones: it turns the bias gradient into one more weight gradient */
     INPUT_STRIDE = 40,       /* a multiple of the register tile: inputs are rows of a product, too */
     HEAD_COUNT = DECODER_PARTS, /* opacity, shape, colour */
@@ -75,13 +75,21 @@ typedef struct decode_weights {
 } decode_weights;
 
 /**
- * What the networks see of some anchors: feature, unit direction from the camera, distance or 0, and 1.
+ * Where some anchors are seen from: unit direction from the camera, and distance or 0.
  *
  * @param which [in]  [rows] anchors; rows <= DECODE_CHUNK
- * @param input [out] [rows, rounded up to DECODE_TILE with rows of zeros][INPUT_STRIDE]
+ * @param view  [out] [rows][VIEW_COUNT]
  */
-void decode_inputs(const anchors *a, const decoder *d, const float camera[3], const uint32_t *which,
-                   size_t rows, float *input);
+void decode_views(const anchors *a, const decoder *d, const float camera[3], const uint32_t *which,
+                  size_t rows, float *view);
+
+/**
+ * What the networks see of some anchors: feature, view, and 1.
+ *
+ * @param which, view [in]  as decode_views() has them
+ * @param input       [out] [rows, rounded up to DECODE_TILE with rows of zeros][INPUT_STRIDE]
+ */
+void decode_inputs(const anchors *a, const uint32_t *which, const float *view, size_t rows, float *input);
 
 /** Hidden layers of the heads [head, end): hidden [tiled][(end - head) * ANCHOR_HIDDEN_DIM], after ReLU. */
 void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,

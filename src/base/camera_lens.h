@@ -17,6 +17,7 @@ typedef struct camera_lens {
     bool extra_last; /* extra terms are taken at the radially distorted point, not at the undistorted one */
     double numerator[LENS_NUMERATOR]; /* radial factor N(x) / D(x), x = squared radius, constant term 1 */
     double denominator[LENS_DENOMINATOR];
+    int numerator_count, denominator_count; /* terms up to the last that is not 0, when `radial` or `extra` */
     double tangent_x, tangent_y; /* x += tx (r2 + 2 x x) + 2 ty x y; y += ty (r2 + 2 y y) + 2 tx x y */
     double prism[4];             /* x += s0 r2 + s1 r4; y += s2 r2 + s3 r4 */
     double radius_max;           /* undistorted radius up to which the radial part is increasing */
@@ -50,6 +51,11 @@ static inline bool camera_lens_looks_forward(const camera_lens *lens)
 
 /** As gbt_camera_unproject() and gbt_camera_project(), same bits. */
 bool camera_lens_unproject(const camera_lens *lens, double px, double py, double dir_cam[3]);
+
+/** camera_lens_unproject() of the first `count` pixel centres of a row, same bits: dir [count][3], 0 where
+    there is no ray. A lens that is radial alone takes several pixels at a time. */
+void camera_lens_unproject_row(const camera_lens *lens, double py, int count, double *dir);
+
 bool camera_lens_project(const camera_lens *lens, const double point_cam[3], double pixel[2]);
 
 #endif

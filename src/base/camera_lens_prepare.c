@@ -43,6 +43,13 @@ static bool any_nonzero(const double *values, int count)
     return false;
 }
 
+static int term_count(const double *terms, int count)
+{
+    while (count > 1 && terms[count - 1] == 0)
+        count--;
+    return count;
+}
+
 /* The parameters of a camera where its model's row says that they go; false where one is not finite. */
 static bool take_params(const gbt_camera *camera, const camera_model *model, camera_lens *lens)
 {
@@ -105,8 +112,9 @@ bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens)
         return false;
     if (model->kind != LENS_PERSPECTIVE && model->kind != LENS_FISHEYE)
         return check_shape(lens);
-    lens->radial = any_nonzero(lens->numerator + 1, LENS_NUMERATOR - 1) ||
-                   any_nonzero(lens->denominator + 1, LENS_DENOMINATOR - 1);
+    lens->numerator_count = term_count(lens->numerator, LENS_NUMERATOR);
+    lens->denominator_count = term_count(lens->denominator, LENS_DENOMINATOR);
+    lens->radial = lens->numerator_count > 1 || lens->denominator_count > 1;
     lens->extra = lens->tangent_x != 0 || lens->tangent_y != 0 || any_nonzero(lens->prism, 4);
     const double radius_limit = lens->kind == LENS_FISHEYE ? PI : perspective_radius_max;
     if (lens->radial)

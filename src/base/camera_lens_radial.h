@@ -9,11 +9,15 @@
 static inline double camera_lens_radial(const camera_lens *lens, double x, double *d_factor)
 {
     double n = 0, dn = 0, d = 0, dd = 0;
-    for (int i = LENS_NUMERATOR - 1; i >= 0; i--) {
+    for (int i = lens->numerator_count - 1; i >= 0; i--) {
         dn = dn * x + n;
         n = n * x + lens->numerator[i];
     }
-    for (int i = LENS_DENOMINATOR - 1; i >= 0; i--) {
+    if (lens->denominator_count == 1) {
+        *d_factor = dn;
+        return n;
+    }
+    for (int i = lens->denominator_count - 1; i >= 0; i--) {
         dd = dd * x + d;
         d = d * x + lens->denominator[i];
     }

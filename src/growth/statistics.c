@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -143,7 +144,7 @@ static float screen_gradient(const gradient_view *v, const float p[3], const flo
     const float far_square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2],
                 g_square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2],
                 along = p[0] * g[0] + p[1] * g[1] + p[2] * g[2];
-    return sqrtf(fmaxf(far_square * g_square - along * along, 0) * tan_half[0] * tan_half[1]);
+    return sqrtf(larger(far_square * g_square - along * along, 0) * tan_half[0] * tan_half[1]);
 }
 
 /* Does the Gaussian's box touch the cone of a centred pinhole? Or, where a view goes by the screen, its splat
@@ -153,7 +154,7 @@ static bool is_in_cone(const gradient_view *v, const frame *f, size_t i, const f
     if (f->by_screen)
         return p[2] > t_near && is_on_screen(&f->screen, &f->gaussians, i);
     const gaussians *g = &f->gaussians;
-    const float reach = 3 * fmaxf(g->scale_x[i], fmaxf(g->scale_y[i], g->scale_z[i]));
+    const float reach = 3 * larger(g->scale_x[i], larger(g->scale_y[i], g->scale_z[i]));
     return p[2] > t_near && fabsf(p[0]) <= v->tan_half[0] * p[2] + reach &&
            fabsf(p[1]) <= v->tan_half[1] * p[2] + reach;
 }
@@ -179,7 +180,7 @@ static void gather_gradients(const gather_job *job, const gradient_view *view, s
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
         /* Of one of n x n parts the loss, a mean, has n^2 times the photo's gradient; the half width is 1/n
            of the photo's. */
-        s->grad_accum[at] += fminf(screen_gradient(view, p, d) / job->parts, gradient_max);
+        s->grad_accum[at] += smaller(screen_gradient(view, p, d) / job->parts, gradient_max);
         s->grad_count[at] += 1;
     }
 }

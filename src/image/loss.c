@@ -81,8 +81,9 @@ static size_t round_up(size_t count, size_t multiple) { return (count + multiple
 static loss_tile tile_at(const loss_job *job, loss_room *room, size_t index)
 {
     loss_tile t = {.job = job, .room = room};
-    t.column = index % job->across * TILE_OWNED;
-    t.owned = smaller_size(TILE_OWNED, job->width - t.column);
+    const size_t place = index % job->across; /* tiles of one row are about as wide as each other */
+    t.column = place * job->width / job->across;
+    t.owned = (place + 1) * job->width / job->across - t.column;
     t.first = (ptrdiff_t)t.column - RADIUS;
     t.segment = round_up(t.owned + 2 * RADIUS, LOSS_LANES * LOSS_GROUP) / LOSS_LANES;
     if (t.segment < LOSS_LANES)

@@ -11,6 +11,7 @@
 
 #include "base/camera_pose.h"
 #include "base/clones.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -22,7 +23,7 @@ enum { ROW_GRAIN = 8 };
 /* The tracer sees no ray that starts farther out. */
 static const double origin_max = 1e17;
 
-/* Directions of so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
+/* Directions of about so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
 static const size_t kept_rays = (size_t)1 << 23;
 
 /* Part of the aperture, in shares of its area and of a turn. */
@@ -69,13 +70,6 @@ static void orthographic_row(const ray_job *job, const camera_pose *at, int row,
             origin[3 * i + k] = (float)(base[k] + job->column_u[i] * r[k]);
             dir[3 * i + k] = forward[k];
         }
-}
-
-static void unproject_row(const ray_job *job, int row, double *dir)
-{
-    for (int i = 0; i < job->shot->camera.width; i++, dir += 3)
-        if (!camera_lens_unproject(&job->lens, i + 0.5, row + 0.5, dir))
-            memset(dir, 0, 3 * sizeof *dir);
 }
 
 static void round3(const double from[3], float to[3])
@@ -176,8 +170,10 @@ static void unproject_rows(size_t block, size_t begin, size_t end, void *context
 {
     const ray_job *job = context;
     (void)block;
+    const int width = job->shot->camera.width;
     for (size_t row = begin; row < end; row++)
-        unproject_row(job, (int)row, job->lens_dir + 3 * row * (size_t)job->shot->camera.width);
+        camera_lens_unproject_row(&job->lens, (double)row + 0.5, width,
+                                  job->lens_dir + 3 * row * (size_t)width);
 }
 
 static void make_rows(size_t block, size_t begin, size_t end, void *context)
@@ -274,12 +270,22 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
     return shot->given != NULL ? GBT_OK : check_shot(shot, &lens, err);
 }
 
+/* All arrays but those of the lenses. */
+static void free_rays(ray_image *rays)
+{
+    float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->through};
+    for (int i = 0; i < 5; i++) {
+        mem_free(*all[i]);
+        *all[i] = NULL;
+    }
+}
+
 gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_origin, gbt_error *err)
 {
     if (out->dir != NULL && out->common_origin == common_origin && out->width == width &&
         out->height == height)
         return GBT_OK;
-    ray_image_free(out);
+    free_rays(out);
     const size_t count = (size_t)width * (size_t)height;
     out->origin = mem_alloc(common_origin ? 1 : count, 3 * sizeof *out->origin, "rays", err);
     out->dir = out->origin == NULL ? NULL : mem_alloc(count, 3 * sizeof *out->dir, "rays", err);
@@ -293,6 +299,17 @@ gbt_status ray_image_reserve(ray_image *out, int width, int height, bool common_
     return GBT_OK;
 }
 
+static size_t lens_count(const ray_lens *lens)
+{
+    return (size_t)lens->camera.width * (size_t)lens->camera.height;
+}
+
+static void free_lens(ray_lens *lens)
+{
+    mem_free(lens->dir);
+    lens->dir = NULL;
+}
+
 /* Directions in camera axes, unless they are there from a pose before. */
 static gbt_status unproject_lens(ray_job *job, ray_image *rays, gbt_error *err)
 {
@@ -302,13 +319,19 @@ static gbt_status unproject_lens(ray_job *job, ray_image *rays, gbt_error *err)
             job->lens_dir = rays->lenses[i].dir;
             return GBT_OK;
         }
-    const size_t count = ray_image_count(rays), fit = kept_rays / count;
-    ray_lens *lens = &rays->lenses[rays->next_lens];
+    const size_t count = ray_image_count(rays), fit = smaller_size(kept_rays / count, RAY_LENSES);
+    const int places = fit > 1 ? (int)fit : 1;
+    for (int i = places; i < RAY_LENSES; i++)
+        free_lens(&rays->lenses[i]);
+    const int place = rays->next_lens % places;
+    ray_lens *lens = &rays->lenses[place];
+    if (lens_count(lens) != count)
+        free_lens(lens);
     if (lens->dir == NULL)
         lens->dir = mem_alloc(count, 3 * sizeof *lens->dir, "rays", err);
     if (lens->dir == NULL)
         return GBT_ERR_NO_MEMORY;
-    rays->next_lens = (size_t)rays->next_lens + 1 < fit ? (rays->next_lens + 1) % RAY_LENSES : 0;
+    rays->next_lens = (place + 1) % places;
     lens->camera = *camera;
     job->lens_dir = lens->dir;
     parallel_blocks((size_t)camera->height, ROW_GRAIN, unproject_rows, job);
@@ -410,12 +433,8 @@ float ray_image_reach(const ray_image *rays)
 
 void ray_image_free(ray_image *rays)
 {
-    mem_free(rays->origin);
-    mem_free(rays->dir);
-    mem_free(rays->far);
-    mem_free(rays->near);
-    mem_free(rays->through);
+    free_rays(rays);
     for (int i = 0; i < RAY_LENSES; i++)
-        mem_free(rays->lenses[i].dir);
+        free_lens(&rays->lenses[i]);
     memset(rays, 0, sizeof *rays);
 }

@@ -33,7 +33,7 @@ typedef struct ray_image {
     float *near;      /* nothing nearer than this distance is seen; not below `far`: nothing at all */
     float *through;   /* transmittance of what lies before the part: T starts from it */
     camera_lens lens; /* prepared, of the shot's camera; fx is 0 when the rays were given */
-    /* Kept by ray_image_from_shot() for the next poses of the same lenses, all of this size. */
+    /* Kept by ray_image_from_shot() for the next poses of the same lenses, of any size. */
     ray_lens lenses[RAY_LENSES];
     int next_lens; /* the one to be replaced */
 } ray_image;
@@ -78,7 +78,7 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  *
  * @param sample [in] 0 .. ray_shot_sample_count() - 1
  * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size
- *                        is the same; empty on failure
+ *                        is the same, what it keeps of lenses always; empty on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite or not
  *         a rotation, rays that start beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
  * Threads: runs in parallel over rows; same bits for every thread count.

@@ -231,6 +231,37 @@ static void pixels_come_back(void **state)
     }
 }
 
+/* A row of pixels has the bits of its pixels one by one, also where there is no ray: beyond a fold, too far
+   out; and before a pole. */
+static void rows_are_pixels(void **state)
+{
+    (void)state;
+    enum { COUNT = WIDTH + 3 };
+    static const lens_case limits[] = {
+        {.model = GBT_CAMERA_SIMPLE_RADIAL, .params = {100, 320, 240, -0.5}},
+        {.model = GBT_CAMERA_SIMPLE_RADIAL, .params = {1e-160, 320, 240, 0.5}},
+        {.model = GBT_CAMERA_OPENCV_FISHEYE, .params = {60, 60, 320, 240, -0.05, 0.01}},
+        {.model = GBT_CAMERA_FULL_OPENCV, .params = {100, 100, 320, 240, 0, 0, 0, 0, 0, -0.3}}};
+    size_t none = 0;
+    for (size_t i = 0; i < CASE_COUNT + 4; i++) {
+        const lens_case *c = i < CASE_COUNT ? &lens_cases[i] : &limits[i - CASE_COUNT];
+        const gbt_camera camera = camera_of(c->model, c->params);
+        camera_lens lens;
+        assert_true(camera_lens_prepare(&camera, &lens));
+        for (double y = 0.5; y < HEIGHT; y += 37) {
+            static double row[COUNT][3];
+            camera_lens_unproject_row(&lens, y, COUNT, row[0]);
+            for (int k = 0; k < COUNT; k++) {
+                double dir[3] = {0, 0, 0};
+                none += !camera_lens_unproject(&lens, k + 0.5, y, dir);
+                if (memcmp(row[k], dir, sizeof dir) != 0)
+                    fail_msg("%s, case %zu: other bits at %d %g", name_of(c), i, k, y);
+            }
+        }
+    }
+    assert_true(none > 3 * COUNT);
+}
+
 /* Lenses whose terms mix x and y have no closed inverse. Random strong ones: what is seen in the picture
  * comes back. */
 static void strong_lenses_come_back(void **state)
@@ -843,6 +874,7 @@ int main(void)
         cmocka_unit_test(the_page_has_the_list),
         cmocka_unit_test(projects_as_the_formula),
         cmocka_unit_test(pixels_come_back),
+        cmocka_unit_test(rows_are_pixels),
         cmocka_unit_test(strong_lenses_come_back),
         cmocka_unit_test(directions_come_back),
         cmocka_unit_test(no_distortion_is_the_plain_model),

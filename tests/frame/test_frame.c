@@ -3,6 +3,7 @@
    averaged in order, same bits for all threads. */
 #include "anchor/fixture.h"
 #include "base/camera_pose.h"
+#include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
 #include "base/vec.h"
@@ -287,10 +288,43 @@ static void no_rays(void **state)
     free_world(&w);
 }
 
+/* Anchors of all sizes whose Gaussians end a little before or behind the edge of what is seen. */
+static void reaching_into_view(void **state)
+{
+    (void)state;
+    anchors a = random_anchors(ANCHORS, OFFSETS, 5);
+    const view_bounds bounds = {.plane_count = 1, .plane = {{1, 0, 0}}};
+    const visible_reach reach = {.sigmas = 3};
+    for (size_t i = 0; i < ANCHORS; i++) {
+        float *l = a.scale_log + 6 * i;
+        const float *o = a.offset + 3 * OFFSETS * i;
+        double farthest = 0;
+        for (size_t k = 0; k < 6; k++)
+            l[k] = spread(5, 200 + k, i, -40.0f, 35.0f);
+        for (size_t k = 0; k < OFFSETS; k++) {
+            double square = 0;
+            for (size_t c = 0; c < 3; c++)
+                square += pow((double)o[3 * k + c] * exp(fmin((double)l[c], 30)), 2);
+            farthest = fmax(farthest, sqrt(square));
+        }
+        const double scale = exp(fmin((double)fmaxf(l[3], fmaxf(l[4], l[5])), 30));
+        a.position[3 * i] = (float)((farthest + 3 * scale) * (i % 2 == 0 ? 1 - 1e-4 : 1 + 1e-4));
+    }
+    uint32_t *visible = NULL;
+    size_t count = 0, capacity = 0;
+    assert_ok(visible_find(frame_neural(&a, NULL), &bounds, &reach, NULL, &visible, &count, &capacity, NULL));
+    assert_int_equal(count, ANCHORS / 2);
+    for (size_t i = 0; i < count; i++)
+        assert_int_equal(visible[i], 2 * i);
+    mem_free(visible);
+    anchors_free(&a);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_reached_is_left_out),
+        cmocka_unit_test(reaching_into_view),
         cmocka_unit_test(the_cone_is_narrow),
         cmocka_unit_test(a_camera_is_a_shot),
         cmocka_unit_test(a_tracer_of_the_caller),

@@ -163,7 +163,7 @@ static void gradient_is_right(void **state)
 static void tiles_meet(void **state)
 {
     (void)state;
-    static const int sizes[][2] = {{500, 9}, {247, 5}, {8, 300}, {7, 129}};
+    static const int sizes[][2] = {{500, 9}, {247, 5}, {492, 5}, {493, 5}, {8, 300}, {7, 129}};
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         const int width = sizes[k][0], height = sizes[k][1], count = 3 * width * height;
         image x = make_noise(width, height, 3, 1), y = make_noise(width, height, 3, 2),

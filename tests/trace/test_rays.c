@@ -91,7 +91,8 @@ static void plain_shots_are_cameras(void **state)
     }
 }
 
-/* More lenses of one size than are kept, twice: always the bits of a lens seen for the first time. */
+/* More lenses than are kept, of three sizes: always the bits of a lens seen for the first time. And two that
+   take turns are kept, though their sizes differ. */
 static void lenses_are_kept(void **state)
 {
     (void)state;
@@ -101,11 +102,23 @@ static void lenses_are_kept(void **state)
         gbt_camera camera;
         ray_image fresh = {0};
         assert_true(gbt_camera_shifted(&shot.camera, 0.25 * (i % (RAY_LENSES + 3)), 0, &camera));
+        camera.height -= i % 3;
         assert_ok(ray_image_from_camera(&camera, &kept, NULL));
         assert_ok(ray_image_from_camera(&camera, &fresh, NULL));
-        assert_memory_equal(kept.dir, fresh.dir, COUNT * 3 * sizeof *fresh.dir);
+        assert_memory_equal(kept.dir, fresh.dir, ray_image_count(&fresh) * 3 * sizeof *fresh.dir);
         ray_image_free(&fresh);
     }
+    ray_image_free(&kept);
+    gbt_camera upright = shot.camera;
+    upright.width = H;
+    upright.height = W;
+    for (int i = 0; i < 4; i++) {
+        const double *wide = kept.lenses[0].dir, *high = kept.lenses[1].dir;
+        assert_ok(ray_image_from_camera(i % 2 == 0 ? &shot.camera : &upright, &kept, NULL));
+        assert_true(kept.lenses[0].dir == wide || i == 0);
+        assert_true(kept.lenses[1].dir == high || i == 1);
+    }
+    assert_true(kept.lenses[1].dir != NULL && kept.lenses[2].dir == NULL);
     ray_image_free(&kept);
 }
 

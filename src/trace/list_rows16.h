@@ -106,43 +106,6 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
     return (row_response){r.t, response_alpha(&g, r.d2), vfloat16_set1(0)};
 }
 
-static inline vfloat16 count_where(vmask16 m, vfloat16 count)
-{
-    return vfloat16_add_where(m, count, vfloat16_set1(1));
-}
-
-/* order[place] = number of the key that comes there: as many keys are smaller, or equal and before it. Keys
-   are finite; room for 16 more is overwritten. */
-static void rank_rows(float *key, size_t count, uint32_t *order)
-{
-    const vfloat16 zero = vfloat16_set1(0);
-    for (size_t i = count; i < count + 16; i++)
-        key[i] = INFINITY;
-    for (size_t first = 0; first < count; first += 16) {
-        _Alignas(64) float place[16];
-        const vfloat16 mine = vfloat16_load(key + first);
-        vfloat16 before[4] = {zero, zero, zero, zero};
-        for (size_t i = 0; i < first; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_le(vfloat16_set1(key[i + k]), mine), before[k]);
-        for (size_t i = first + 16; i < count; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_lt(vfloat16_set1(key[i + k]), mine), before[k]);
-        for (size_t i = 0; i < 16; i += 4)
-            for (int k = 0; k < 4; k++) {
-                const vfloat16 other = vfloat16_set1(key[first + i + k]);
-                const vmask16 later = vmask16_from_bits(0xFFFEu << (i + k) & 0xFFFF);
-                before[k] = count_where(
-                    vmask16_or(vfloat16_lt(other, mine), vmask16_and(vfloat16_le(other, mine), later)),
-                    before[k]);
-            }
-        vfloat16_store(place,
-                       vfloat16_add(vfloat16_add(before[0], before[1]), vfloat16_add(before[2], before[3])));
-        for (size_t k = 0; k < 16 && first + k < count; k++)
-            order[(size_t)place[k]] = (uint32_t)(first + k);
-    }
-}
-
 static inline const list_row *row_at(const tile_list *list, const list_rows *rows, size_t place)
 {
     return &list->row[rows->number[rows->order[place]]];
@@ -207,7 +170,6 @@ static inline float packet_depth(const list_rows *rows, size_t i, float t_near)
    A depth may be negative where there is no hit; keys are not, so that rows that are cut come first. */
 static void order_by_middle(const kernel_scene *scene, const tile_list *list, list_rows *rows)
 {
-    enum { FEW = 256 };
     const size_t count = rows->count;
     bool cut = false;
     for (size_t i = 0; i < count; i++) {
@@ -223,14 +185,10 @@ static void order_by_middle(const kernel_scene *scene, const tile_list *list, li
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;
     }
-    if (count <= FEW)
-        rank_rows(rows->key, count, rows->order);
-    else { /* in the place of arrays that are not yet set */
-        const uint64_t *order =
-            sort_list(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
-        for (size_t i = 0; i < count; i++)
-            rows->order[i] = (uint32_t)order[i];
-    }
+    const uint64_t *order = /* in the place of arrays that are not yet set */
+        sort_depths(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
+    for (size_t i = 0; i < count; i++)
+        rows->order[i] = (uint32_t)order[i];
     order_copies(scene, list, rows);
     if (cut)
         order_cut_rows(list, rows);

@@ -189,7 +189,11 @@ static void order_by_middle(const kernel_scene *scene, const tile_list *list, li
         sort_depths(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
     for (size_t i = 0; i < count; i++)
         rows->order[i] = (uint32_t)order[i];
-    order_copies(scene, list, rows);
+    uint64_t equal = 0; /* as wide as what is compared, so that compilers compare many at a time */
+    for (size_t i = 1; i < count; i++)
+        equal |= (order[i] ^ order[i - 1]) >> 32 == 0;
+    if (equal)
+        order_copies(scene, list, rows);
     if (cut)
         order_cut_rows(list, rows);
 }

@@ -57,6 +57,8 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
     out->number = word + n;
+    out->steps = 0; /* so they stay in one order for all rays */
+    out->crowded = false;
     return true;
 }
 
@@ -296,15 +298,6 @@ static inline void end_appending(list_rows *out, const insertion *s)
     out->product = s->before;
     out->steps = 0;
     out->crowded = false;
-}
-
-static void append_rows(list_rows *out)
-{
-    const list_rows rows = *out;
-    insertion s = start_insertion(&rows);
-    for (int i = 0; i < (int)rows.count; i++)
-        append_row(&rows, &s, i, row_load(rows.alpha, (int)rows.order[i]));
-    end_appending(out, &s);
 }
 
 static void insert_rows(list_rows *out)

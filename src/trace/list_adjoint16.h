@@ -81,15 +81,16 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
             const int i = (int)(first + k);
             const vfloat16 alpha = vfloat16_select(vmask16_from_bits(entry[i].lanes),
                                                    vfloat16_min(r[k].raw, alpha_max), vfloat16_set1(0));
-            row_store(rows.t, i, r[k].t);
             row_store(rows.alpha, i, alpha);
             row_store(rows.inverse, i, r[k].inverse);
-            rows.order[i] = (uint32_t)i;
             rows.number[i] = number[k];
-            if (one_order)
+            if (one_order) {
                 append_row(&rows, &s, i, alpha);
-            else
-                insert_row(&rows, &s, i, r[k].t, alpha);
+                continue;
+            }
+            row_store(rows.t, i, r[k].t);
+            rows.order[i] = (uint32_t)i;
+            insert_row(&rows, &s, i, r[k].t, alpha);
         }
     }
     if (one_order)

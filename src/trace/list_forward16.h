@@ -59,7 +59,7 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
             g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
             general |= g[k]->pair;
         }
-        respond_together(g, a, b, length, r);
+        respond_together(g, a, b, length, r, NULL);
         if (general & ROW_GENERAL)
             for (unsigned k = 0; k < TOGETHER; k++)
                 if (g[k]->pair & ROW_GENERAL)
@@ -157,6 +157,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     }
     if (tape != NULL)
         tape->count = kept;
+    if (tape != NULL && one_order)
+        vfloat16_store(tape->through + packet * PACKET_LANES, lowest);
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
@@ -181,6 +183,10 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
     tile_middle(&view->boxes[part], middle);
     if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
+        return false;
+    if (tape != NULL && scene->settings.packet_order &&
+        mem_reserve((void **)&tape->through, &tape->through_capacity, 0, TILE_PACKETS * PACKET_LANES,
+                    sizeof *tape->through, "hit tape", NULL) != GBT_OK)
         return false;
     counters->candidates += (uint64_t)list.count;
     for (int p = 0; p < TILE_PACKETS; p++) {

@@ -71,8 +71,11 @@ typedef struct row_response {
    the next row by itself. */
 enum { TOGETHER = 4 };
 
-static inline void respond_together(const list_row *const g[TOGETHER], vfloat16 a, vfloat16 b,
-                                    vfloat16 length, row_response out[TOGETHER])
+/* `v`: NULL, or what sum_rows() finds of each row. */
+static inline __attribute__((always_inline)) void respond_together(const list_row *const g[TOGETHER],
+                                                                   vfloat16 a, vfloat16 b, vfloat16 length,
+                                                                   row_response out[TOGETHER],
+                                                                   vfloat16 (*v)[3])
 {
     vfloat16 w1[TOGETHER], w2[TOGETHER], w3[TOGETHER], y[TOGETHER], exponent[TOGETHER];
     const vfloat16 one = vfloat16_set1(1);
@@ -93,6 +96,12 @@ static inline void respond_together(const list_row *const g[TOGETHER], vfloat16 
                          vfloat16_set1(-120.0f));
         out[k].t = vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g[k]->depth)),
                                 vfloat16_mul(w1[k], out[k].inverse));
+    }
+    for (int k = 0; k < TOGETHER && v != NULL; k++) {
+        const vfloat16 along = vfloat16_mul(w1[k], out[k].inverse);
+        v[k][0] = vfloat16_mul(y[k], out[k].inverse);
+        v[k][1] = vfloat16_mul(along, w2[k]);
+        v[k][2] = vfloat16_mul(along, w3[k]);
     }
     for (int k = 0; k < TOGETHER; k++)
         out[k].raw = vfloat16_mul(vfloat16_set1(g[k]->opacity), vfloat16_exp2(exponent[k]));
@@ -284,20 +293,6 @@ static inline void end_insertion(list_rows *out, const insertion *s)
     out->product = s->before;
     out->steps = s->steps;
     out->crowded = s->crowded;
-}
-
-/* Row i of one order for all rays (trace_settings.packet_order). */
-static inline void append_row(const list_rows *rows, insertion *s, int i, vfloat16 alpha)
-{
-    row_store(rows->through, i, s->before);
-    s->before = vfloat16_fnma(s->before, alpha, s->before);
-}
-
-static inline void end_appending(list_rows *out, const insertion *s)
-{
-    out->product = s->before;
-    out->steps = 0;
-    out->crowded = false;
 }
 
 static void insert_rows(list_rows *out)

@@ -91,14 +91,14 @@ typedef struct list_memory {
     tile_list list;
     list_row *unsorted;
     view_shape *shape;
-    float *key, *bound;
+    float *key, *bound, *across, *down; /* across, down: SHAPE_ACROSS, SHAPE_DOWN */
     uint64_t *order, *spare;
 } list_memory;
 
 static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
 {
     const size_t n = (count + 15) & ~(size_t)15, wide = n + 16;
-    const size_t floats = 2 * 16 * n + 2 * 8 * n + SHAPE_FIELDS * n + 8 * wide;
+    const size_t floats = 2 * 16 * n + 2 * 8 * n + SHAPE_FIELDS * n + 10 * wide;
     if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, floats, sizeof(float),
                     "list of a tile", NULL) != GBT_OK)
         return false;
@@ -120,11 +120,14 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
     out->order = (uint64_t *)(void *)(at + 3 * wide);
     out->spare = (uint64_t *)(void *)(at + 5 * wide);
     out->list.general = (uint16_t *)(void *)(at + 7 * wide);
+    out->across = at + 8 * wide;
+    out->down = at + 9 * wide;
     return true;
 }
 
 /* t / |(a, b, 1)| where sixteen Gaussians are nearest to the middle of the tile, and a lower bound of it in
-   all of the tile. Rows and shapes have been read; those of general ones are set after. */
+   all of the tile; and SHAPE_ACROSS and SHAPE_DOWN. Rows and shapes have been read; those of general ones are
+   set after. */
 static inline void depth_in_tile(const list_memory *m, size_t first, const float low[2], const float high[2])
 {
     const float *rows[16], *shapes[16];
@@ -153,6 +156,11 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
     vfloat16_store(m->bound + first, vfloat16_div(vfloat16_mul(vfloat16_mul(r[7], vfloat16_set1(0.99999f)),
                                                                vfloat16_sub(one, s[7])),
                                                   vfloat16_max(reach, vfloat16_set1(1e-3f))));
+    const vfloat16 minus = vfloat16_mul(vfloat16_set1(-1), s[3]);
+    vfloat16_store(m->across + first, vfloat16_div(minus, s[2]));
+    vfloat16_store(m->down + first,
+                   vfloat16_div(vfloat16_mul(s[2], minus),
+                                vfloat16_add(vfloat16_mul(s[3], s[3]), vfloat16_mul(s[4], s[4]))));
 }
 
 /* The same of a general one, on the ray through the middle. */
@@ -281,13 +289,12 @@ static inline void place_shape(const list_memory *m, size_t from, size_t i)
         return;
     }
     const view_outline *o = &m->shape[from].outline;
-    const float *c = o->chol;
     list->shape[SHAPE_X][i] = row->a + o->x;
     list->shape[SHAPE_Y][i] = row->b + o->y;
     for (int k = 0; k < 3; k++)
-        list->shape[SHAPE_CHOL + k][i] = c[k];
-    list->shape[SHAPE_ACROSS][i] = -c[1] / c[0];
-    list->shape[SHAPE_DOWN][i] = -c[0] * c[1] / (c[1] * c[1] + c[2] * c[2]);
+        list->shape[SHAPE_CHOL + k][i] = o->chol[k];
+    list->shape[SHAPE_ACROSS][i] = m->across[from];
+    list->shape[SHAPE_DOWN][i] = m->down[from];
 }
 
 /* The list of a part of a tile, in order. False when memory ran out. */

@@ -418,11 +418,13 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
 
 /* From the turned axes of a face to the Gaussians' own. */
 static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
-                      size_t end, gradient_record *out)
+                      size_t end, block_sums *out)
 {
     for (size_t first = begin; first < end; first += 16) {
-        _Alignas(64) float by_record[16][16], turned[16][16];
+        _Alignas(64) float by_record[16][16];
         _Alignas(64) float slope[3][16];
+        const size_t at = first - begin;
+        unsigned general = 0;
         const float *rows[16];
         uint32_t id[16];
         vfloat16 sum[16], to[GRADIENT_OPACITY];
@@ -432,6 +434,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
             const view_record *r = &view->records[first + i < end ? first + i : first];
             rows[i] = by_record[i];
             id[i] = record_id(r);
+            general |= (unsigned)record_is_general(r) << i;
             slope[0][i] = (float)r->a;
             slope[1][i] = (float)r->b;
             slope[2][i] = r->depth;
@@ -450,19 +453,14 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
         hvv[4] = vfloat16_sub(zero, hvv[4]);
         hvv[5] = vfloat16_sub(zero, hvv[5]);
         turn_moments(form.e, hv, hvv, to);
-        for (int k = 0; k < 9; k++)
-            vfloat16_store(turned[k], to[k]);
-        for (size_t i = 0; i < 16 && first + i < end; i++) {
-            gradient_record *o = &out[first + i - begin];
-            const bool general = record_is_general(&view->records[first + i]);
-            for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
-                o->sum[k] = general ? by_record[i][SLOT_HV + k] : turned[k][i];
-            o->sum[GRADIENT_OPACITY] = -2 * by_record[i][SLOT_H] / view->records[first + i].opacity;
-            for (int k = 0; k < 3; k++)
-                o->sum[GRADIENT_COLOR + k] = by_record[i][SLOT_COLOR + k];
-            o->sum[GRADIENT_WEIGHT] = by_record[i][SLOT_WEIGHT];
-            o->id = record_id(&view->records[first + i]);
-        }
+        for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
+            vfloat16_store(out->sum[k] + at,
+                           vfloat16_select(vmask16_from_bits(general), sum[SLOT_HV + k], to[k]));
+        vfloat16_store(out->sum[GRADIENT_OPACITY] + at,
+                       vfloat16_div(vfloat16_mul(vfloat16_set1(-2), sum[SLOT_H]), g.opacity));
+        for (int k = 0; k < 3; k++)
+            vfloat16_store(out->sum[GRADIENT_COLOR + k] + at, sum[SLOT_COLOR + k]);
+        vfloat16_store(out->sum[GRADIENT_WEIGHT] + at, sum[SLOT_WEIGHT]);
     }
 }
 

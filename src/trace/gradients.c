@@ -4,11 +4,13 @@
 
 #include <string.h>
 
+#include "base/clones.h"
+#include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
-enum { RECORD_BLOCK = 512, FIRST_SLOTS = 4096 };
+enum { FIRST_SLOTS = 4096, LANES = 64 /* Gaussians whose gradients are found together */ };
 
 static size_t slot_of(uint32_t id, size_t slot_count)
 {
@@ -78,52 +80,87 @@ typedef struct reduction {
     float *weight;
 } reduction;
 
-/* The gradient of the fields of Gaussian `i` from its sums; NULL: it was not seen, and may hold anything,
-   even NaN. */
-static void write_gradient(const gaussians *g, const float *records, size_t i, const float *sum,
-                           gaussians *out, float *weight)
+static inline float masked(float value, uint32_t mask)
 {
-    static const float nothing[GRADIENT_FLOATS];
-    const bool seen = sum != NULL;
-    sum = seen ? sum : nothing;
-    const float *m = records + i * RECORD_FLOATS + RECORD_MATRIX;
-    const float s[3] = {g->scale_x[i], g->scale_y[i], g->scale_z[i]};
-    const float *v = sum + GRADIENT_V, *vv = sum + GRADIENT_VV;
-    out->mean_x[i] = seen ? -2 * (m[0] * v[0] + m[3] * v[1] + m[6] * v[2]) : 0;
-    out->mean_y[i] = seen ? -2 * (m[1] * v[0] + m[4] * v[1] + m[7] * v[2]) : 0;
-    out->mean_z[i] = seen ? -2 * (m[2] * v[0] + m[5] * v[1] + m[8] * v[2]) : 0;
-    out->scale_x[i] = seen ? -2 * vv[0] / s[0] : 0;
-    out->scale_y[i] = seen ? -2 * vv[1] / s[1] : 0;
-    out->scale_z[i] = seen ? -2 * vv[2] / s[2] : 0;
-    const float wx = seen ? 2 * vv[3] * (s[2] / s[1] - s[1] / s[2]) : 0;
-    const float wy = seen ? 2 * vv[4] * (s[0] / s[2] - s[2] / s[0]) : 0;
-    const float wz = seen ? 2 * vv[5] * (s[1] / s[0] - s[0] / s[1]) : 0;
-    const float qw = g->quat_w[i], qx = g->quat_x[i], qy = g->quat_y[i], qz = g->quat_z[i];
-    /* dL/dq = 2 q (0, dL/domega), a quaternion product: tangent to the unit sphere */
-    out->quat_w[i] = seen ? 2 * (-qx * wx - qy * wy - qz * wz) : 0;
-    out->quat_x[i] = seen ? 2 * (qw * wx + qy * wz - qz * wy) : 0;
-    out->quat_y[i] = seen ? 2 * (qw * wy + qz * wx - qx * wz) : 0;
-    out->quat_z[i] = seen ? 2 * (qw * wz + qx * wy - qy * wx) : 0;
-    out->opacity[i] = sum[GRADIENT_OPACITY];
-    out->red[i] = sum[GRADIENT_COLOR];
-    out->green[i] = sum[GRADIENT_COLOR + 1];
-    out->blue[i] = sum[GRADIENT_COLOR + 2];
-    if (weight != NULL)
-        weight[i] = sum[GRADIENT_WEIGHT];
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    bits &= mask;
+    memcpy(&value, &bits, sizeof bits);
+    return value;
+}
+
+enum { MEAN, SCALE = MEAN + 3, QUAT = SCALE + 3, GEOMETRY = QUAT + 4 }; /* as in GAUSSIANS_FIELDS */
+
+/* The gradients of mean, scale and rotation of `count` Gaussians from `first` on, whose sums begin at `from`.
+   m: rows of S^-1 R^T; seen: all bits, or 0: the Gaussian may hold anything, even NaN. */
+FASTEST_CLONE static void find_gradients(const gaussians *g, size_t first, size_t count,
+                                         const float (*m)[LANES], const block_sums *sums, size_t from,
+                                         const uint32_t *seen, float (*restrict out)[LANES])
+{
+    const float *scale[3] = {g->scale_x + first, g->scale_y + first, g->scale_z + first};
+    const float *quat[4] = {g->quat_w + first, g->quat_x + first, g->quat_y + first, g->quat_z + first};
+    const float(*v)[VIEW_GRAIN + 16] = sums->sum + GRADIENT_V,
+                                 (*vv)[VIEW_GRAIN + 16] = sums->sum + GRADIENT_VV;
+    for (size_t i = 0; i < count; i++) {
+        const size_t at = from + i;
+        const uint32_t mask = seen[at];
+        const float sx = scale[0][i], sy = scale[1][i], sz = scale[2][i];
+        for (int k = 0; k < 3; k++)
+            out[MEAN + k][i] =
+                masked(-2 * (m[k][i] * v[0][at] + m[3 + k][i] * v[1][at] + m[6 + k][i] * v[2][at]), mask);
+        out[SCALE][i] = masked(-2 * vv[0][at] / sx, mask);
+        out[SCALE + 1][i] = masked(-2 * vv[1][at] / sy, mask);
+        out[SCALE + 2][i] = masked(-2 * vv[2][at] / sz, mask);
+        const float wx = 2 * vv[3][at] * (sz / sy - sy / sz), wy = 2 * vv[4][at] * (sx / sz - sz / sx),
+                    wz = 2 * vv[5][at] * (sy / sx - sx / sy);
+        const float qw = quat[0][i], qx = quat[1][i], qy = quat[2][i], qz = quat[3][i];
+        /* dL/dq = 2 q (0, dL/domega), a quaternion product: tangent to the unit sphere */
+        out[QUAT][i] = masked(2 * (-qx * wx - qy * wy - qz * wz), mask);
+        out[QUAT + 1][i] = masked(2 * (qw * wx + qy * wz - qz * wy), mask);
+        out[QUAT + 2][i] = masked(2 * (qw * wy + qz * wx - qx * wz), mask);
+        out[QUAT + 3][i] = masked(2 * (qw * wz + qx * wy - qy * wx), mask);
+    }
+}
+
+/* The gradients of a block. The sums of Gaussians that were not seen are 0. */
+static void write_gradients(const gaussians *g, const float *records, size_t begin, size_t end,
+                            const block_sums *sums, const uint32_t *seen, gaussians *out, float *weight)
+{
+#define X(name, pad, meaning) out->name,
+    float *const to[] = {GAUSSIANS_FIELDS(X)};
+#undef X
+    for (size_t first = begin; first < end; first += LANES) {
+        const size_t count = smaller_size(LANES, end - first), at = first - begin,
+                     bytes = count * sizeof(float);
+        float matrix[9][LANES], d[GEOMETRY][LANES];
+        for (size_t i = 0; i < count; i++)
+            for (size_t k = 0; k < 9; k++)
+                matrix[k][i] = records[(first + i) * RECORD_FLOATS + RECORD_MATRIX + k];
+        find_gradients(g, first, count, (const float(*)[LANES])matrix, sums, at, seen, d);
+        for (int k = 0; k < GAUSSIANS_FIELD_COUNT; k++) /* opacity and colour are in one order in both */
+            memcpy(to[k] + first, k < GEOMETRY ? d[k] : sums->sum[GRADIENT_OPACITY + k - GEOMETRY] + at,
+                   bytes);
+        if (weight != NULL)
+            memcpy(weight + first, sums->sum[GRADIENT_WEIGHT] + at, bytes);
+    }
 }
 
 static void reduce_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
     const reduction *job = context;
+    block_sums sums;
+    uint32_t seen[VIEW_GRAIN];
     for (size_t i = begin; i < end; i++) {
         float sum[GRADIENT_FLOATS] = {0};
         for (uint32_t k = job->first[i]; k < job->first[i + 1]; k++)
             for (int j = 0; j < GRADIENT_FLOATS; j++)
                 sum[j] += job->record[k]->sum[j];
-        write_gradient(job->g, job->records, i, job->first[i] != job->first[i + 1] ? sum : NULL, job->out,
-                       job->weight);
+        for (int j = 0; j < GRADIENT_FLOATS; j++)
+            sums.sum[j][i - begin] = sum[j];
+        seen[i - begin] = job->first[i] != job->first[i + 1] ? UINT32_MAX : 0;
     }
+    write_gradients(job->g, job->records, begin, end, &sums, seen, job->out, job->weight);
 }
 
 gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *lists, size_t list_count,
@@ -156,7 +193,7 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
         }
     reduction job = {
         .g = g, .records = records, .record = order->record, .first = first, .out = out, .weight = weight};
-    parallel_blocks(g->count, RECORD_BLOCK, reduce_block, &job);
+    parallel_blocks(g->count, VIEW_GRAIN, reduce_block, &job);
     return GBT_OK;
 }
 
@@ -170,24 +207,21 @@ typedef struct list_reduction {
 } list_reduction;
 
 /* The sums of Gaussian `begin` and those after it over all faces, in their order. */
-static void add_faces(const list_reduction *job, size_t block, size_t begin, gradient_record *sum, bool *seen)
+static void add_faces(const list_reduction *job, size_t block, size_t begin, block_sums *sums, uint32_t *seen)
 {
     const list_view *view = job->view;
-    gradient_record of_face[VIEW_GRAIN];
+    block_sums of_face;
     for (int f = 0; f < view->face_count; f++) {
         const view_kept *kept = &view->kept[(size_t)f * view->block_count + block];
         job->kernel->turn_sums(job->scene, view, &view->face[f], kept->first, kept->first + kept->records,
-                               of_face);
+                               &of_face);
         for (size_t k = 0; k < kept->records; k++) {
-            const size_t i = of_face[k].id - begin;
-            if (!(of_face[k].sum[GRADIENT_WEIGHT] > 0))
+            const size_t i = record_id(&view->records[kept->first + k]) - begin;
+            if (!(of_face.sum[GRADIENT_WEIGHT][k] > 0))
                 continue;
-            if (!seen[i])
-                sum[i] = of_face[k];
-            else
-                for (int j = 0; j < GRADIENT_FLOATS; j++)
-                    sum[i].sum[j] += of_face[k].sum[j];
-            seen[i] = true;
+            for (int j = 0; j <= GRADIENT_WEIGHT; j++)
+                sums->sum[j][i] = seen[i] ? sums->sum[j][i] + of_face.sum[j][k] : of_face.sum[j][k];
+            seen[i] = UINT32_MAX;
         }
     }
 }
@@ -195,12 +229,11 @@ static void add_faces(const list_reduction *job, size_t block, size_t begin, gra
 static void reduce_view_block(size_t block, size_t begin, size_t end, void *context)
 {
     const list_reduction *job = context;
-    gradient_record sum[VIEW_GRAIN];
-    bool seen[VIEW_GRAIN] = {false};
-    add_faces(job, block, begin, sum, seen);
-    for (size_t i = begin; i < end; i++)
-        write_gradient(job->g, job->scene->records, i, seen[i - begin] ? sum[i - begin].sum : NULL, job->out,
-                       job->weight);
+    block_sums sums;
+    uint32_t seen[VIEW_GRAIN] = {0};
+    memset(&sums, 0, sizeof sums);
+    add_faces(job, block, begin, &sums, seen);
+    write_gradients(job->g, job->scene->records, begin, end, &sums, seen, job->out, job->weight);
 }
 
 gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *scene, const list_view *view,

@@ -69,11 +69,19 @@ typedef struct tape_entry {
 typedef struct hit_tape {
     tape_entry *entries;
     size_t count, capacity;
+    float *through; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
+    size_t through_capacity;
 } hit_tape;
+
+static inline size_t hit_tape_bytes(const hit_tape *tape)
+{
+    return tape->count * sizeof *tape->entries + tape->through_capacity * sizeof *tape->through;
+}
 
 static inline void hit_tape_free(hit_tape *tape)
 {
     mem_free(tape->entries);
+    mem_free(tape->through);
     *tape = (hit_tape){0};
 }
 

@@ -91,14 +91,14 @@ typedef struct list_memory {
     tile_list list;
     list_row *unsorted;
     view_shape *shape;
-    float *key, *bound;
+    float *key, *bound, *across, *down; /* across, down: SHAPE_ACROSS, SHAPE_DOWN */
     uint64_t *order, *spare;
 } list_memory;
 
 static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
 {
     const size_t n = (count + 15) & ~(size_t)15, wide = n + 16;
-    const size_t floats = 2 * 16 * n + 2 * 8 * n + SHAPE_FIELDS * n + 8 * wide;
+    const size_t floats = 2 * 16 * n + 2 * 8 * n + SHAPE_FIELDS * n + 10 * wide;
     if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, floats, sizeof(float),
                     "list of a tile", NULL) != GBT_OK)
         return false;
@@ -120,11 +120,14 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
     out->order = (uint64_t *)(void *)(at + 3 * wide);
     out->spare = (uint64_t *)(void *)(at + 5 * wide);
     out->list.general = (uint16_t *)(void *)(at + 7 * wide);
+    out->across = at + 8 * wide;
+    out->down = at + 9 * wide;
     return true;
 }
 
 /* t / |(a, b, 1)| where sixteen Gaussians are nearest to the middle of the tile, and a lower bound of it in
-   all of the tile. Rows and shapes have been read; those of general ones are set after. */
+   all of the tile; and SHAPE_ACROSS and SHAPE_DOWN. Rows and shapes have been read; those of general ones are
+   set after. */
 static inline void depth_in_tile(const list_memory *m, size_t first, const float low[2], const float high[2])
 {
     const float *rows[16], *shapes[16];
@@ -153,6 +156,11 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
     vfloat16_store(m->bound + first, vfloat16_div(vfloat16_mul(vfloat16_mul(r[7], vfloat16_set1(0.99999f)),
                                                                vfloat16_sub(one, s[7])),
                                                   vfloat16_max(reach, vfloat16_set1(1e-3f))));
+    const vfloat16 minus = vfloat16_mul(vfloat16_set1(-1), s[3]);
+    vfloat16_store(m->across + first, vfloat16_div(minus, s[2]));
+    vfloat16_store(m->down + first,
+                   vfloat16_div(vfloat16_mul(s[2], minus),
+                                vfloat16_add(vfloat16_mul(s[3], s[3]), vfloat16_mul(s[4], s[4]))));
 }
 
 /* The same of a general one, on the ray through the middle. */
@@ -180,7 +188,8 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_fram
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }
 
-/* Numbers of the rows by key, then number: whatever else is in the list, two rows have one order. */
+/* Numbers of the rows by the bits of their keys, then number: whatever else is in the list, two rows have one
+   order. Upper halves are equal where keys are. */
 static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from, uint64_t *to)
 {
     enum { DIGITS = 4, VALUES = 256 };
@@ -215,6 +224,57 @@ static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from,
     return from;
 }
 
+static inline vfloat16 count_where(vmask16 m, vfloat16 count)
+{
+    return vfloat16_add_where(m, count, vfloat16_set1(1));
+}
+
+/* out[place] = bits of a key << 32 | its number: as many keys are smaller, or equal and before it. Keys are
+   not negative; room for 16 more is overwritten. */
+static void rank_rows(float *key, size_t count, uint64_t *out)
+{
+    const vfloat16 zero = vfloat16_set1(0);
+    for (size_t i = count; i < count + 16; i++)
+        key[i] = INFINITY;
+    for (size_t first = 0; first < count; first += 16) {
+        _Alignas(64) float place[16];
+        const vfloat16 mine = vfloat16_load(key + first);
+        vfloat16 before[4] = {zero, zero, zero, zero};
+        for (size_t i = 0; i < first; i += 4)
+            for (int k = 0; k < 4; k++)
+                before[k] = count_where(vfloat16_le(vfloat16_set1(key[i + k]), mine), before[k]);
+        for (size_t i = first + 16; i < count; i += 4)
+            for (int k = 0; k < 4; k++)
+                before[k] = count_where(vfloat16_lt(vfloat16_set1(key[i + k]), mine), before[k]);
+        for (size_t i = 0; i < 16; i += 4)
+            for (int k = 0; k < 4; k++) {
+                const vfloat16 other = vfloat16_set1(key[first + i + k]);
+                const vmask16 later = vmask16_from_bits(0xFFFEu << (i + k) & 0xFFFF);
+                before[k] = count_where(
+                    vmask16_or(vfloat16_lt(other, mine), vmask16_and(vfloat16_le(other, mine), later)),
+                    before[k]);
+            }
+        vfloat16_store(place,
+                       vfloat16_add(vfloat16_add(before[0], before[1]), vfloat16_add(before[2], before[3])));
+        for (size_t i = first; i < first + 16 && i < count; i++) {
+            uint32_t bits;
+            memcpy(&bits, &key[i], sizeof bits);
+            out[(size_t)place[i - first]] = (uint64_t)bits << 32 | i;
+        }
+    }
+}
+
+/* As sort_list(), of keys that are not negative, with room for 16 more. Few are compared all with all, which
+   takes half the time. */
+static const uint64_t *sort_depths(float *key, size_t count, uint64_t *from, uint64_t *to)
+{
+    enum { FEW = 256 };
+    if (count > FEW)
+        return sort_list(key, count, from, to);
+    rank_rows(key, count, from);
+    return from;
+}
+
 /* Row `i` of the order: number `from` of those read. */
 static inline void place_shape(const list_memory *m, size_t from, size_t i)
 {
@@ -229,13 +289,12 @@ static inline void place_shape(const list_memory *m, size_t from, size_t i)
         return;
     }
     const view_outline *o = &m->shape[from].outline;
-    const float *c = o->chol;
     list->shape[SHAPE_X][i] = row->a + o->x;
     list->shape[SHAPE_Y][i] = row->b + o->y;
     for (int k = 0; k < 3; k++)
-        list->shape[SHAPE_CHOL + k][i] = c[k];
-    list->shape[SHAPE_ACROSS][i] = -c[1] / c[0];
-    list->shape[SHAPE_DOWN][i] = -c[0] * c[1] / (c[1] * c[1] + c[2] * c[2]);
+        list->shape[SHAPE_CHOL + k][i] = o->chol[k];
+    list->shape[SHAPE_ACROSS][i] = m->across[from];
+    list->shape[SHAPE_DOWN][i] = m->down[from];
 }
 
 /* The list of a part of a tile, in order. False when memory ran out. */
@@ -274,7 +333,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
             m.list.any_general = true;
             depth_of_ellipsoid(scene, part_frame(view, part), middle, &m, i);
         }
-    const uint64_t *order = sort_list(m.key, count, m.order, m.spare);
+    const uint64_t *order = sort_depths(m.key, count, m.order, m.spare);
     memset(m.list.general, 0, n / 16 * sizeof *m.list.general);
     for (size_t i = 0; i < n; i++)
         place_shape(&m, (uint32_t)order[i < count ? i : count - 1], i);

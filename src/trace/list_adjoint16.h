@@ -61,7 +61,6 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
     const uint32_t *used_number = used->number;
     const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
                    length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
-    const bool one_order = scene->settings.packet_order;
     insertion s = start_insertion(&rows);
     for (size_t first = 0; first < count; first += TOGETHER) {
         const list_row *g[TOGETHER];
@@ -72,7 +71,7 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
             g[k] = &used_row[number[k]];
             general |= g[k]->pair;
         }
-        respond_together(g, a, b, length, r);
+        respond_together(g, a, b, length, r, NULL);
         if (general & ROW_GENERAL)
             for (size_t k = 0; k < TOGETHER; k++)
                 if (g[k]->pair & ROW_GENERAL)
@@ -81,21 +80,15 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
             const int i = (int)(first + k);
             const vfloat16 alpha = vfloat16_select(vmask16_from_bits(entry[i].lanes),
                                                    vfloat16_min(r[k].raw, alpha_max), vfloat16_set1(0));
-            row_store(rows.t, i, r[k].t);
             row_store(rows.alpha, i, alpha);
             row_store(rows.inverse, i, r[k].inverse);
-            rows.order[i] = (uint32_t)i;
             rows.number[i] = number[k];
-            if (one_order)
-                append_row(&rows, &s, i, alpha);
-            else
-                insert_row(&rows, &s, i, r[k].t, alpha);
+            row_store(rows.t, i, r[k].t);
+            rows.order[i] = (uint32_t)i;
+            insert_row(&rows, &s, i, r[k].t, alpha);
         }
     }
-    if (one_order)
-        end_appending(out, &s);
-    else
-        end_insertion(out, &s);
+    end_insertion(out, &s);
 }
 
 /* Row i goes on past `other`: what lies behind is added to the one in front. */
@@ -170,22 +163,6 @@ static bool collect_behind(list_rows *out, const used_list *used, const vfloat16
     return true;
 }
 
-/* The same where all rays have one order. */
-static void collect_behind_in_order(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
-                                    vfloat16 background)
-{
-    const list_rows copy = *out, *const rows = &copy;
-    const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
-    vfloat16 behind = background;
-    for (int i = (int)rows->count; i-- > 0;) {
-        const vfloat16 term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
-                                           dot_lanes(used->row[rows->number[i]].color, direction));
-        row_store(rows->term, i, term);
-        row_store(rows->behind, i, behind);
-        behind = vfloat16_add(behind, term);
-    }
-}
-
 /* The same ray by ray. False when memory ran out. */
 static bool collect_behind_by_ray(list_rows *rows, const used_list *used, const vfloat16 d_rgb[3],
                                   vfloat16 background, list_scratch *scratch)
@@ -245,19 +222,17 @@ static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], co
     vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat16_sum_rows(terms)));
 }
 
-/* A row that the form does not hold for. */
-static void sum_general(const kernel_scene *scene, const packet_rays *rays, const list_rows *rows, int i,
-                        uint32_t id, const vfloat16 d_rgb[3], float *to)
+/* Those of a row that the form does not hold for. */
+static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id, vmask16 hit,
+                        vfloat16 h, vfloat16 weight, const vfloat16 d_rgb[3], float *to)
 {
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
     ray_lanes ray;
-    vfloat16 v[3], h, weight;
+    vfloat16 v[3];
     load_rays(rays, &ray);
     response r = respond(&g, &ray, t_near);
     refine_point(&g, &ray, t_near, &r);
-    row_gradients(rows, i, vfloat16_set1(scene->settings.alpha_max), &h, &weight);
-    const vmask16 hit = vfloat16_lt(zero, row_load(rows->alpha, i));
     for (int k = 0; k < 3; k++) /* v may be more than a float holds where the ray did not hit */
         v[k] = vfloat16_select(hit, r.v[k], zero);
     add_sums(h, weight, v, d_rgb, to);
@@ -271,8 +246,8 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
 {
     const list_rows copy = *from, *const rows = &copy; /* what stores cannot change */
     const list_row *used_row = used->row;
-    const vfloat16 one = vfloat16_set1(1), a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
-                   alpha_max = vfloat16_set1(scene->settings.alpha_max),
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(seen->a),
+                   b = vfloat16_load(seen->b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
                    d_rgb[3] = {direction[0], direction[1], direction[2]};
     for (int first = 0; first < (int)rows->count; first += TOGETHER) {
         const list_row *g[TOGETHER];
@@ -299,7 +274,62 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
         for (int k = 0; k < TOGETHER && first + k < (int)rows->count; k++) {
             float *to = sums[rows->number[first + k]].sum;
             if (g[k]->pair & ROW_GENERAL)
-                sum_general(scene, rays, rows, first + k, g[k]->id, d_rgb, to);
+                sum_general(scene, rays, g[k]->id, vfloat16_lt(zero, row_load(rows->alpha, first + k)), h[k],
+                            weight[k], d_rgb, to);
+            else
+                add_sums(h[k], weight[k], v[k], d_rgb, to);
+        }
+    }
+}
+
+/* The whole adjoint where the rays have one order, from the last row to the first. `through` is T behind all
+   rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background. */
+static void sum_in_order(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
+                         const list_rays *seen, const tape_entry *entry, size_t count, vfloat16 through,
+                         vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
+{
+    const list_row *used_row = used->row;
+    const uint32_t *used_number = used->number;
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(seen->a),
+                   b = vfloat16_load(seen->b), length = vfloat16_load(seen->length),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max),
+                   d_rgb[3] = {direction[0], direction[1], direction[2]};
+    for (size_t done = 0; done < count; done += TOGETHER) {
+        const size_t left = count - done;
+        const list_row *g[TOGETHER];
+        row_response r[TOGETHER];
+        vfloat16 alpha[TOGETHER], clear[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
+            v[TOGETHER][3];
+        uint32_t number[TOGETHER], general = 0;
+        for (size_t k = 0; k < TOGETHER; k++) {
+            number[k] = used_number[entry[k < left ? left - 1 - k : 0].id];
+            g[k] = &used_row[number[k]];
+            general |= g[k]->pair;
+        }
+        respond_together(g, a, b, length, r, v);
+        if (general & ROW_GENERAL)
+            for (size_t k = 0; k < TOGETHER; k++)
+                if (g[k]->pair & ROW_GENERAL)
+                    r[k] = respond_general(scene, rays, g[k]->id);
+        for (size_t k = 0; k < TOGETHER; k++) {
+            const vmask16 hit = vmask16_from_bits(entry[k < left ? left - 1 - k : 0].lanes);
+            alpha[k] = vfloat16_select(hit, vfloat16_min(r[k].raw, alpha_max), zero);
+            clear[k] = vfloat16_sub(one, alpha[k]);
+            inverse[k] = vfloat16_div(one, clear[k]);
+        }
+        for (size_t k = 0; k < TOGETHER; k++) { /* the cap: see row_gradients() */
+            const vfloat16 color = dot_lanes(g[k]->color, d_rgb);
+            through = vfloat16_mul(through, inverse[k]);
+            weight[k] = vfloat16_mul(through, alpha[k]);
+            const vfloat16 d_log = vfloat16_mul(weight[k], vfloat16_sub(color, behind));
+            h[k] = vfloat16_select(vfloat16_lt(alpha[k], alpha_max),
+                                   vfloat16_mul(vfloat16_set1(-0.5f), d_log), zero);
+            behind = vfloat16_fma(clear[k], behind, vfloat16_mul(alpha[k], color));
+        }
+        for (size_t k = 0; k < TOGETHER && k < left; k++) {
+            float *to = sums[number[k]].sum;
+            if (g[k]->pair & ROW_GENERAL)
+                sum_general(scene, rays, g[k]->id, vfloat16_lt(zero, alpha[k]), h[k], weight[k], d_rgb, to);
             else
                 add_sums(h[k], weight[k], v[k], d_rgb, to);
         }
@@ -307,22 +337,28 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
 }
 
 static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                              const list_rays *seen, const tape_entry *entry, size_t count,
-                              float d_rgb_in[3][PACKET_LANES], list_rows *rows, list_scratch *scratch)
+                              const list_rays *seen, const hit_tape *tape, size_t from, size_t count,
+                              int packet, float d_rgb_in[3][PACKET_LANES], list_rows *rows,
+                              list_scratch *scratch)
 {
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
         behind_all[c] = vfloat16_load(rays->background[c]);
     }
+    const tape_entry *entry = tape->entries + from;
+    if (scene->settings.packet_order) {
+        sum_in_order(scene, used, rays, seen, entry, count,
+                     vfloat16_load(tape->through + packet * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
+                     scratch->sums);
+        return true;
+    }
     replay_list(scene, used, rays, seen, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
     const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), rows->product);
-    if (scene->settings.packet_order)
-        collect_behind_in_order(rows, used, d_rgb, background);
-    else if ((rows->crowded || !collect_behind(rows, used, d_rgb, background)) &&
-             !collect_behind_by_ray(rows, used, d_rgb, background, scratch))
+    if ((rows->crowded || !collect_behind(rows, used, d_rgb, background)) &&
+        !collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
     sum_rows(scene, used, rays, seen, d_rgb, rows, scratch->sums);
     return true;
@@ -349,8 +385,8 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
         while (at < tape->count && tape->entries[at].packet == p)
             at++;
         slope_rays(part_frame(view, part), &rays->packet[p], middle, &seen);
-        if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape->entries + from, at - from,
-                               d_rgb[p], &rows, scratch))
+        if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape, from, at - from, p, d_rgb[p],
+                               &rows, scratch))
             return false;
     }
     for (size_t i = 0; i < pairs; i++) {
@@ -382,11 +418,13 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
 
 /* From the turned axes of a face to the Gaussians' own. */
 static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
-                      size_t end, gradient_record *out)
+                      size_t end, block_sums *out)
 {
     for (size_t first = begin; first < end; first += 16) {
-        _Alignas(64) float by_record[16][16], turned[16][16];
+        _Alignas(64) float by_record[16][16];
         _Alignas(64) float slope[3][16];
+        const size_t at = first - begin;
+        unsigned general = 0;
         const float *rows[16];
         uint32_t id[16];
         vfloat16 sum[16], to[GRADIENT_OPACITY];
@@ -396,6 +434,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
             const view_record *r = &view->records[first + i < end ? first + i : first];
             rows[i] = by_record[i];
             id[i] = record_id(r);
+            general |= (unsigned)record_is_general(r) << i;
             slope[0][i] = (float)r->a;
             slope[1][i] = (float)r->b;
             slope[2][i] = r->depth;
@@ -414,19 +453,14 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
         hvv[4] = vfloat16_sub(zero, hvv[4]);
         hvv[5] = vfloat16_sub(zero, hvv[5]);
         turn_moments(form.e, hv, hvv, to);
-        for (int k = 0; k < 9; k++)
-            vfloat16_store(turned[k], to[k]);
-        for (size_t i = 0; i < 16 && first + i < end; i++) {
-            gradient_record *o = &out[first + i - begin];
-            const bool general = record_is_general(&view->records[first + i]);
-            for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
-                o->sum[k] = general ? by_record[i][SLOT_HV + k] : turned[k][i];
-            o->sum[GRADIENT_OPACITY] = -2 * by_record[i][SLOT_H] / view->records[first + i].opacity;
-            for (int k = 0; k < 3; k++)
-                o->sum[GRADIENT_COLOR + k] = by_record[i][SLOT_COLOR + k];
-            o->sum[GRADIENT_WEIGHT] = by_record[i][SLOT_WEIGHT];
-            o->id = record_id(&view->records[first + i]);
-        }
+        for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
+            vfloat16_store(out->sum[k] + at,
+                           vfloat16_select(vmask16_from_bits(general), sum[SLOT_HV + k], to[k]));
+        vfloat16_store(out->sum[GRADIENT_OPACITY] + at,
+                       vfloat16_div(vfloat16_mul(vfloat16_set1(-2), sum[SLOT_H]), g.opacity));
+        for (int k = 0; k < 3; k++)
+            vfloat16_store(out->sum[GRADIENT_COLOR + k] + at, sum[SLOT_COLOR + k]);
+        vfloat16_store(out->sum[GRADIENT_WEIGHT] + at, sum[SLOT_WEIGHT]);
     }
 }
 

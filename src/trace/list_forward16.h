@@ -59,7 +59,7 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
             g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
             general |= g[k]->pair;
         }
-        respond_together(g, a, b, length, r);
+        respond_together(g, a, b, length, r, NULL);
         if (general & ROW_GENERAL)
             for (unsigned k = 0; k < TOGETHER; k++)
                 if (g[k]->pair & ROW_GENERAL)
@@ -118,7 +118,9 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
     const vfloat16 start = parts ? vfloat16_load(rays->through) : one;
-    vfloat16 lowest = start, rgb[3] = {zero, zero, zero};
+    const bool one_order = scene->settings.packet_order;
+    vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
+             rgb[3] = {zero, zero, zero};
     const list_rows copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
@@ -132,12 +134,14 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     tape_entry *entries = tape != NULL ? tape->entries : NULL;
     for (size_t i = 0; i < rows->count; i++) {
         const int row = (int)rows->order[i];
-        const vfloat16 T = vfloat16_mul(start, row_load(rows->through, (int)i)),
-                       alpha = row_load(rows->alpha, row), next = vfloat16_fnma(T, alpha, T);
+        const vfloat16 through = one_order ? product : row_load(rows->through, (int)i),
+                       T = vfloat16_mul(start, through), alpha = row_load(rows->alpha, row),
+                       next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
         const list_row *g = &list->row[rows->number[row]];
         const unsigned bits = vmask16_bits(blend);
+        product = vfloat16_fnma(product, alpha, product);
         lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
         for (int c = 0; c < 3; c++)
             rgb[c] = vfloat16_fma(weight, vfloat16_set1(g->color[c]), rgb[c]);
@@ -153,6 +157,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     }
     if (tape != NULL)
         tape->count = kept;
+    if (tape != NULL && one_order)
+        vfloat16_store(tape->through + packet * PACKET_LANES, lowest);
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
@@ -161,7 +167,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     for (int c = 0; c < 3; c++)
         vfloat16_store(out->rgb[c], vfloat16_fma(lowest, vfloat16_load(rays->background[c]), rgb[c]));
     vfloat16_store(out->transmittance, lowest);
-    out->ended = vmask16_bits(vfloat16_lt(vfloat16_mul(start, rows->product), stop_at));
+    out->ended = vmask16_bits(vfloat16_lt(vfloat16_mul(start, product), stop_at));
     if (scene->extra)
         store_extra(&extra, out);
     return true;
@@ -178,6 +184,10 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
     if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;
+    if (tape != NULL && scene->settings.packet_order &&
+        mem_reserve((void **)&tape->through, &tape->through_capacity, 0, TILE_PACKETS * PACKET_LANES,
+                    sizeof *tape->through, "hit tape", NULL) != GBT_OK)
+        return false;
     counters->candidates += (uint64_t)list.count;
     for (int p = 0; p < TILE_PACKETS; p++) {
         const packet_rays *packet = &rays->packet[p];
@@ -188,9 +198,7 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         slope_rays(part_frame(view, part), packet, middle, &seen);
         gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
         order_by_middle(scene, &list, &rows);
-        if (scene->settings.packet_order)
-            append_rows(&rows);
-        else
+        if (!scene->settings.packet_order)
             insert_rows(&rows);
         if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
             !blend_list(scene, &list, &rows, packet, rays->parts, p, &out[p], tape, counters))

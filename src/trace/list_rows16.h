@@ -57,6 +57,8 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
     out->number = word + n;
+    out->steps = 0; /* so they stay in one order for all rays */
+    out->crowded = false;
     return true;
 }
 
@@ -69,8 +71,11 @@ typedef struct row_response {
    the next row by itself. */
 enum { TOGETHER = 4 };
 
-static inline void respond_together(const list_row *const g[TOGETHER], vfloat16 a, vfloat16 b,
-                                    vfloat16 length, row_response out[TOGETHER])
+/* `v`: NULL, or what sum_rows() finds of each row. */
+static inline __attribute__((always_inline)) void respond_together(const list_row *const g[TOGETHER],
+                                                                   vfloat16 a, vfloat16 b, vfloat16 length,
+                                                                   row_response out[TOGETHER],
+                                                                   vfloat16 (*v)[3])
 {
     vfloat16 w1[TOGETHER], w2[TOGETHER], w3[TOGETHER], y[TOGETHER], exponent[TOGETHER];
     const vfloat16 one = vfloat16_set1(1);
@@ -92,6 +97,12 @@ static inline void respond_together(const list_row *const g[TOGETHER], vfloat16 
         out[k].t = vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g[k]->depth)),
                                 vfloat16_mul(w1[k], out[k].inverse));
     }
+    for (int k = 0; k < TOGETHER && v != NULL; k++) {
+        const vfloat16 along = vfloat16_mul(w1[k], out[k].inverse);
+        v[k][0] = vfloat16_mul(y[k], out[k].inverse);
+        v[k][1] = vfloat16_mul(along, w2[k]);
+        v[k][2] = vfloat16_mul(along, w3[k]);
+    }
     for (int k = 0; k < TOGETHER; k++)
         out[k].raw = vfloat16_mul(vfloat16_set1(g[k]->opacity), vfloat16_exp2(exponent[k]));
 }
@@ -104,43 +115,6 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
     load_rays(rays, &ray);
     const response r = respond(&g, &ray, vfloat16_set1(scene->settings.t_near));
     return (row_response){r.t, response_alpha(&g, r.d2), vfloat16_set1(0)};
-}
-
-static inline vfloat16 count_where(vmask16 m, vfloat16 count)
-{
-    return vfloat16_add_where(m, count, vfloat16_set1(1));
-}
-
-/* order[place] = number of the key that comes there: as many keys are smaller, or equal and before it. Keys
-   are finite; room for 16 more is overwritten. */
-static void rank_rows(float *key, size_t count, uint32_t *order)
-{
-    const vfloat16 zero = vfloat16_set1(0);
-    for (size_t i = count; i < count + 16; i++)
-        key[i] = INFINITY;
-    for (size_t first = 0; first < count; first += 16) {
-        _Alignas(64) float place[16];
-        const vfloat16 mine = vfloat16_load(key + first);
-        vfloat16 before[4] = {zero, zero, zero, zero};
-        for (size_t i = 0; i < first; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_le(vfloat16_set1(key[i + k]), mine), before[k]);
-        for (size_t i = first + 16; i < count; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_lt(vfloat16_set1(key[i + k]), mine), before[k]);
-        for (size_t i = 0; i < 16; i += 4)
-            for (int k = 0; k < 4; k++) {
-                const vfloat16 other = vfloat16_set1(key[first + i + k]);
-                const vmask16 later = vmask16_from_bits(0xFFFEu << (i + k) & 0xFFFF);
-                before[k] = count_where(
-                    vmask16_or(vfloat16_lt(other, mine), vmask16_and(vfloat16_le(other, mine), later)),
-                    before[k]);
-            }
-        vfloat16_store(place,
-                       vfloat16_add(vfloat16_add(before[0], before[1]), vfloat16_add(before[2], before[3])));
-        for (size_t k = 0; k < 16 && first + k < count; k++)
-            order[(size_t)place[k]] = (uint32_t)(first + k);
-    }
 }
 
 static inline const list_row *row_at(const tile_list *list, const list_rows *rows, size_t place)
@@ -207,7 +181,6 @@ static inline float packet_depth(const list_rows *rows, size_t i, float t_near)
    A depth may be negative where there is no hit; keys are not, so that rows that are cut come first. */
 static void order_by_middle(const kernel_scene *scene, const tile_list *list, list_rows *rows)
 {
-    enum { FEW = 256 };
     const size_t count = rows->count;
     bool cut = false;
     for (size_t i = 0; i < count; i++) {
@@ -223,15 +196,15 @@ static void order_by_middle(const kernel_scene *scene, const tile_list *list, li
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;
     }
-    if (count <= FEW)
-        rank_rows(rows->key, count, rows->order);
-    else { /* in the place of arrays that are not yet set */
-        const uint64_t *order =
-            sort_list(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
-        for (size_t i = 0; i < count; i++)
-            rows->order[i] = (uint32_t)order[i];
-    }
-    order_copies(scene, list, rows);
+    const uint64_t *order = /* in the place of arrays that are not yet set */
+        sort_depths(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
+    for (size_t i = 0; i < count; i++)
+        rows->order[i] = (uint32_t)order[i];
+    uint64_t equal = 0; /* as wide as what is compared, so that compilers compare many at a time */
+    for (size_t i = 1; i < count; i++)
+        equal |= (order[i] ^ order[i - 1]) >> 32 == 0;
+    if (equal)
+        order_copies(scene, list, rows);
     if (cut)
         order_cut_rows(list, rows);
 }
@@ -320,29 +293,6 @@ static inline void end_insertion(list_rows *out, const insertion *s)
     out->product = s->before;
     out->steps = s->steps;
     out->crowded = s->crowded;
-}
-
-/* Row i of one order for all rays (trace_settings.packet_order). */
-static inline void append_row(const list_rows *rows, insertion *s, int i, vfloat16 alpha)
-{
-    row_store(rows->through, i, s->before);
-    s->before = vfloat16_fnma(s->before, alpha, s->before);
-}
-
-static inline void end_appending(list_rows *out, const insertion *s)
-{
-    out->product = s->before;
-    out->steps = 0;
-    out->crowded = false;
-}
-
-static void append_rows(list_rows *out)
-{
-    const list_rows rows = *out;
-    insertion s = start_insertion(&rows);
-    for (int i = 0; i < (int)rows.count; i++)
-        append_row(&rows, &s, i, row_load(rows.alpha, (int)rows.order[i]));
-    end_appending(out, &s);
 }
 
 static void insert_rows(list_rows *out)

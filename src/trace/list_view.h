@@ -103,6 +103,12 @@ typedef struct gradient_slot {
     _Alignas(64) float sum[16];
 } gradient_slot;
 
+/* Sums of gradient_record, of the Gaussians or records of a block. Arrays 2048 bytes apart would compete for
+   the same lines of the cache. */
+typedef struct block_sums {
+    _Alignas(64) float sum[GRADIENT_FLOATS][VIEW_GRAIN + 16];
+} block_sums;
+
 /* The records that one face has of a block of VIEW_GRAIN Gaussians. */
 typedef struct view_kept {
     size_t first;
@@ -223,9 +229,10 @@ typedef struct list_kernel {
     /** Its adjoint, into the slots of the part's pairs. */
     bool (*backward)(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
                      float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape, list_scratch *scratch);
-    /** Sums of the records [begin, end) of a face over their slots, turned into the Gaussians' own axes. */
+    /** Sums of the records [begin, end) of a face, a block at most, over their slots, turned into the
+        Gaussians' own axes. */
     void (*turn_sums)(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
-                      size_t end, gradient_record *out);
+                      size_t end, block_sums *out);
 } list_kernel;
 
 CPU_DECLARE_VARIANTS(list_kernel, list_kernel);

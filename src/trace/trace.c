@@ -182,7 +182,7 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
     if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
     tile_store_pixels(p->rays, &p->view, &p->out, x0, y0, rays, out);
-    const size_t bytes = tile->tape.count * sizeof *tile->tape.entries;
+    const size_t bytes = hit_tape_bytes(&tile->tape);
     tile->tape_dropped = p->keep_tape &&
                          atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
                          p->scene->tape_bytes_max > 0;
@@ -331,7 +331,7 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
         counters->rows += c->rows;
         counters->pairs += c->pairs;
         counters->spilled_packets += c->spilled_packets;
-        counters->tape_bytes += scene->tiles[i].tape.count * sizeof(tape_entry);
+        counters->tape_bytes += hit_tape_bytes(&scene->tiles[i].tape);
     }
     return GBT_OK;
 }

@@ -389,14 +389,18 @@ static void no_room_for_the_tape(void **state)
     (void)state;
     gaussians g = cloud(500, 4, 0.8f, 0.2f, 0.8f);
     ray_image rays = make_rays(false);
-    const trace_settings s = trace_settings_default();
-    pass_result *kept = run(&g, &s, &rays, TRACE_TILE, 0), *again = run(&g, &s, &rays, TRACE_TILE, 1);
-    assert_true(kept->counters.tape_bytes > 1000 && again->counters.tape_bytes == 0);
-    assert_memory_equal(kept->d.mean_x, again->d.mean_x, g.count * sizeof(float));
-    assert_memory_equal(kept->d.quat_y, again->d.quat_y, g.count * sizeof(float));
-    assert_memory_equal(kept->d.opacity, again->d.opacity, g.count * sizeof(float));
-    pass_free(kept);
-    pass_free(again);
+    trace_settings s = trace_settings_default();
+    for (int i = 0; i < 3; i++) {
+        const trace_kernel kernel = i == 0 ? TRACE_TILE : TRACE_LIST;
+        s.packet_order = i == 2;
+        pass_result *kept = run(&g, &s, &rays, kernel, 0), *again = run(&g, &s, &rays, kernel, 1);
+        assert_true(kept->counters.tape_bytes > 1000 && again->counters.tape_bytes == 0);
+        assert_memory_equal(kept->d.mean_x, again->d.mean_x, g.count * sizeof(float));
+        assert_memory_equal(kept->d.quat_y, again->d.quat_y, g.count * sizeof(float));
+        assert_memory_equal(kept->d.opacity, again->d.opacity, g.count * sizeof(float));
+        pass_free(kept);
+        pass_free(again);
+    }
     ray_image_free(&rays);
     gaussians_free(&g);
 }

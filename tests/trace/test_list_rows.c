@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/trace/test_list_rows.c -- the steps that the adjoint over lists takes are bounded, and it gives the
-   same with too many of them. */
+/* tests/trace/test_list_rows.c -- few depths are sorted as many are; the steps that the adjoint over lists
+   takes are bounded, and it gives the same with too many of them. */
 #include "base/near.h"
+#include "base/rng.h"
 #include "test_support.h"
 
 #define SIMD16_PLAIN
@@ -48,8 +49,33 @@ static void steps_on_are_bounded(void **state)
     list_scratch_free(&scratch);
 }
 
+/* Depths of which few or many are equal, some 0, large or infinite. */
+static void few_depths_are_sorted_as_many(void **state)
+{
+    (void)state;
+    enum { MOST = 300 };
+    static _Alignas(64) float key[MOST + 16];
+    static uint64_t few[MOST], from[MOST], to[MOST];
+    for (size_t count = 0; count <= MOST; count++) {
+        for (size_t i = 0; i < count; i++) {
+            const float u = rng_uniform(count, 0, i);
+            key[i] = u < 0.1f ? 0 : u < 0.15f ? FLT_MAX : u < 0.2f ? INFINITY : u < 0.6f ? floorf(20 * u) : u;
+        }
+        const uint64_t *many = sort_list(key, count, from, to);
+        rank_rows(key, count, few);
+        for (size_t i = 0; i < count; i++) {
+            assert_int_equal((uint32_t)few[i], (uint32_t)many[i]);
+            assert_true(i == 0 || (few[i] >> 32 == few[i - 1] >> 32) == (many[i] >> 32 == many[i - 1] >> 32));
+        }
+        const uint64_t *either = sort_depths(key, count, from, to);
+        for (size_t i = 0; i < count; i++)
+            assert_int_equal((uint32_t)either[i], (uint32_t)few[i]);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(steps_on_are_bounded)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(few_depths_are_sorted_as_many),
+                                       cmocka_unit_test(steps_on_are_bounded)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

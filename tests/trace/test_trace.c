@@ -450,6 +450,35 @@ static void one_order_beside_a_plane(void **state)
     }
 }
 
+/* Gaussians one behind the other, the first opaque beyond its size: T falls to a hundredth at the first, and
+   rays stop before the last. */
+static void one_order_to_the_stop(void **state)
+{
+    (void)state;
+    if (kernel != TRACE_LIST)
+        return;
+    enum { COUNT = 11 };
+    gaussians g = some(COUNT, 0.4f);
+    for (size_t i = 0; i < COUNT; i++) {
+        g.mean_z[i] = 3 + 0.1f * (float)i;
+        g.scale_x[i] = g.scale_z[i] = i % 4 == 3 ? 1 : 0.5f; /* 1: evaluated as ellipsoids */
+        g.scale_y[i] = 0.8f * g.scale_x[i];
+        g.red[i] = rng_uniform(64, 0, i);
+        g.blue[i] = rng_uniform(64, 1, i);
+    }
+    g.opacity[0] = 2.5f;
+    trace_settings s = with_background();
+    s.packet_order = true;
+    const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0, 5}, 16, 16, 6);
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    const figures f = compare(&g, &s, &rays, 64, 1e-6);
+    assert_figures("to the stop", &f, 1e-5);
+    assert_true(f.counters.blended > 5 * f.rays && f.counters.blended < COUNT * f.rays);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 static int compare_doubles(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -926,12 +955,14 @@ static void instruction_sets_and_threads_give_the_same_bits(void **state)
     (void)state;
     /* More than 3,072 Gaussians: from there on Embree builds a tree with several threads. */
     const cloud_def defs[] = {{"", 4000, 1, 0.03f, 0.3f, 30, 0.9f, {2, 1, -5}},
-                              {"", 500, 0.2f, 1, 2, 1, 0.03f, {0, 0, 0}}};
+                              {"", 500, 0.2f, 1, 2, 1, 0.03f, {0, 0, 0}},
+                              {"", 1000, 1, 0.03f, 0.3f, 30, 0.9f, {2, 1, -5}}};
     const int before = parallel_threads();
     uint64_t spilled = 0;
-    for (size_t i = 0; i < 2; i++) {
+    for (size_t i = 0; i < (kernel == TRACE_LIST ? 3 : 2); i++) {
         gaussians g = make_cloud(&defs[i], 60 + i);
-        const trace_settings s = with_background();
+        trace_settings s = with_background();
+        s.packet_order = i == 2; /* which lists alone heed */
         gbt_camera camera = camera_at(defs[i].camera, (double[3]){0, 0, 0.5}, 22, 14, 50);
         if (i == 1) { /* wide and deep: packets spill */
             camera.model = GBT_CAMERA_EQUIRECTANGULAR;
@@ -1219,6 +1250,7 @@ int main(void)
         cmocka_unit_test(random_scenes),
         cmocka_unit_test(one_order_for_sixteen_rays),
         cmocka_unit_test(one_order_beside_a_plane),
+        cmocka_unit_test(one_order_to_the_stop),
         cmocka_unit_test(needles_one_by_one),
         cmocka_unit_test(faces_of_a_cube),
         cmocka_unit_test(rays_that_do_not_run_together),

@@ -128,7 +128,7 @@ static gbt_status keep_piece(cell_drawer *d, const cell_part *part, size_t count
     load->cloud.count = count;
     load->cloud.sh_degree = d->store->sh_degree;
     parallel_blocks(count, UNPACK_BLOCK, unpack_rows, &job);
-    GBT_TRY(visible_find(frame_plain(&load->cloud), &d->bounds, &d->reach, NULL, &load->visible,
+    GBT_TRY(visible_find(frame_plain(&load->cloud), &d->bounds, &d->reach, NULL, NULL, &load->visible,
                          &load->visible_count, &load->visible_capacity, err));
     GBT_TRY(
         plain_forward(&load->cloud, d->bounds.center, load->visible, load->visible_count, &load->seen, err));

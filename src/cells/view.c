@@ -153,8 +153,8 @@ static gbt_status find_chunks(cell_drawer *d, gbt_error *err)
         chunk_ball(d, c, balls.mean + 3 * i, &balls.scale_log[3 * i]);
         balls.scale_log[3 * i + 1] = balls.scale_log[3 * i + 2] = balls.scale_log[3 * i];
     }
-    const gbt_status status = visible_find(frame_plain(&balls), &d->bounds, &d->reach, NULL, &d->visible,
-                                           &d->visible_count, &d->visible_capacity, err);
+    const gbt_status status = visible_find(frame_plain(&balls), &d->bounds, &d->reach, NULL, NULL,
+                                           &d->visible, &d->visible_count, &d->visible_capacity, err);
     gaussian_cloud_free(&balls);
     return status;
 }

@@ -104,8 +104,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         .pixel = (float)f->view.pixel,
         .parallel = f->view.kind == FOOTPRINT_PARALLEL,
         .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
-    GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->visible,
-                         &f->visible_count, &f->visible_capacity, err));
+    GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->draw.chance,
+                         &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = stage_lap(&clock);
     /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
     if (subject.cloud != NULL)

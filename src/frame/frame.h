@@ -7,6 +7,7 @@
 #include "base/stage.h"
 #include "frame/screen.h"
 #include "frame/subject.h"
+#include "frame/visible.h"
 #include "gbtrace/choices.h"
 #include "raster/raster.h"
 #include "trace/footprint.h"
@@ -41,6 +42,7 @@ typedef struct frame_drawing {
     bool one_start; /* rays of a camera that moves while it is read out start at one point, and Gaussians move
                        in their place (frame/one_start.h): lists take the place of the tree. An approximation,
                        for training; it needs a footprint */
+    visible_chance chance;     /* anchors are left out of the view at random, for training */
     bool makes_faint;          /* Gaussians of opacity below alpha_min are made, though not drawn */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel an anchor was made for;
                                   borrowed */

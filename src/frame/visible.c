@@ -11,6 +11,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "base/vec.h"
 
 enum {
@@ -375,6 +376,7 @@ typedef struct visible_job {
     const view_bounds *bounds;
     const visible_reach *reach;
     const screen_view *screen;
+    const visible_chance *chance;
     uint32_t *out;       /* [count]; block b writes from its own begin */
     uint32_t *out_count; /* per block */
 } visible_job;
@@ -387,47 +389,51 @@ static bool is_on_screen(const screen_view *s, const anchors *a, size_t i)
     return screen_touches(s, a->position + 3 * i, straight, scale);
 }
 
+static bool may_be_met(const visible_job *job, size_t i)
+{
+    const anchors *a = job->subject.anchors;
+    if (job->screen != NULL)
+        return is_on_screen(job->screen, a, i);
+    const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;
+    /* Between planes what reaches farther sees no less. So an anchor in view is visible however far it
+       reaches, and one that is not with a bound of its reach is not: most need no more. */
+    if (job->subject.cloud == NULL && job->bounds->plane_count > 0) {
+        if (is_visible(job->bounds, a->position + 3 * i, 0))
+            return true;
+        const part_ball larger_part = anchor_ball(a, i, true);
+        if (!is_visible(job->bounds, larger_part.center,
+                        reach_of(&larger_part, job->reach, pixel_min, job->bounds->center)))
+            return false;
+    }
+    const part_ball part =
+        job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(a, i, false);
+    return is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center));
+}
+
+static bool is_left_out(const visible_chance *chance, size_t i)
+{
+    return chance != NULL && chance->share > 0 && rng_uniform(chance->seed, chance->draw, i) < chance->share;
+}
+
 static void visible_block(size_t block, size_t begin, size_t end, void *context)
 {
     const visible_job *job = context;
     uint32_t kept = 0;
-    const anchors *a = job->subject.anchors;
-    for (size_t i = begin; i < end; i++) {
-        if (job->screen != NULL) {
-            if (is_on_screen(job->screen, a, i))
-                job->out[begin + kept++] = (uint32_t)i;
-            continue;
-        }
-        const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;
-        /* Between planes what reaches farther sees no less. So an anchor in view is visible however far it
-           reaches, and one that is not with a bound of its reach is not: most need no more. */
-        if (job->subject.cloud == NULL && job->bounds->plane_count > 0) {
-            if (is_visible(job->bounds, a->position + 3 * i, 0)) {
-                job->out[begin + kept++] = (uint32_t)i;
-                continue;
-            }
-            const part_ball larger_part = anchor_ball(a, i, true);
-            if (!is_visible(job->bounds, larger_part.center,
-                            reach_of(&larger_part, job->reach, pixel_min, job->bounds->center)))
-                continue;
-        }
-        const part_ball part =
-            job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(a, i, false);
-        if (is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center)))
+    for (size_t i = begin; i < end; i++)
+        if (may_be_met(job, i) && !is_left_out(job->chance, i))
             job->out[begin + kept++] = (uint32_t)i;
-    }
     job->out_count[block] = kept;
 }
 
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        const screen_view *screen, uint32_t **visible, size_t *count, size_t *capacity,
-                        gbt_error *err)
+                        const screen_view *screen, const visible_chance *chance, uint32_t **visible,
+                        size_t *count, size_t *capacity, gbt_error *err)
 {
     const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
     GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts",
                         err));
     uint32_t *list = *visible;
-    visible_job job = {subject, bounds, reach, screen, list, list + parts};
+    visible_job job = {subject, bounds, reach, screen, chance, list, list + parts};
     parallel_blocks(parts, PART_BLOCK, visible_block, &job);
     *count = 0;
     for (size_t b = 0; b < blocks; b++) {

@@ -51,14 +51,21 @@ typedef struct visible_reach {
     const float *pixel_min; /* optional, [parts] */
 } visible_reach;
 
+/** Anchors are left out at random, each with the probability `share`: by (seed, draw, anchor). */
+typedef struct visible_chance {
+    float share; /* [0, 1); 0: none */
+    uint64_t seed, draw;
+} visible_chance;
+
 /**
  * Indices of the anchors whose Gaussians a ray may meet, or of such Gaussians, ascending, into a growing
  * array. GBT_OK or GBT_ERR_NO_MEMORY.
  *
  * @param screen [in] optional (NULL): anchors whose own ellipsoid touches it, whatever the bounds say
+ * @param chance [in] optional (NULL)
  */
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        const screen_view *screen, uint32_t **visible, size_t *count, size_t *capacity,
-                        gbt_error *err);
+                        const screen_view *screen, const visible_chance *chance, uint32_t **visible,
+                        size_t *count, size_t *capacity, gbt_error *err);
 
 #endif

@@ -146,7 +146,9 @@ static growth_def def_of(const trainer *t)
     def.interval = growing_interval(t);
     if (!t->rules.thresholds_by_length)
         return def;
-    const float factor = (float)t->def.threshold_factor *
+    /* What is left out is missed, so gradients and shares of the picture are larger. */
+    const float shown = 1 - step_left_out(t),
+                factor = (float)t->def.threshold_factor / (shown * shown) *
                          schedule_threshold_factor(t->def.views * pace_expected(&t->pace, t->step));
     const bool last = t->def.final_prune_factor > 1 &&
                       pace_progress(&t->pace, t->step) >= last_rounds_from * t->def.grow_until;

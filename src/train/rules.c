@@ -30,6 +30,7 @@ static train_rules own_rules(const gbt_train_def *def)
         .step_pixels = TRAIN_STEP_PIXELS,
         .splats_until = def->splats_until,
         .loose_rays = true,
+        .leaves_out = true,
         .raises_until = fmax(SCHEDULE_ADJUST_FROM, geometry_from), /* anchors grow from there */
         .opaque_from = SCHEDULE_OPAQUE_FROM,
         .last_step_learns = true,

@@ -52,6 +52,7 @@ typedef struct train_rules {
     double splats_until;   /* part of the run in which splats stand for rays */
     bool loose_rays;       /* SCHEDULE_ALPHA_MIN, SCHEDULE_T_MIN and one order for each packet of rays until
                               SCHEDULE_EXACT_FROM */
+    bool leaves_out;       /* anchors at random: schedule_left_out() */
     double raises_until;   /* progress until which the opacities of an offset that is below 0 in the
                               mean are raised */
     double opaque_from;    /* progress from which half of the views have a random background, so that

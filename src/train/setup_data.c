@@ -2,6 +2,7 @@
 /* train/setup_data.c -- from a folder to the photos and points of a run. */
 #include "train/setup_data.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -221,6 +222,10 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
         mem_free(t->scene.views[i].seen);
         t->scene.views[i].seen = NULL;
         t->scene.views[i].seen_count = 0;
+    }
+    for (size_t i = 0; i < t->train_count; i++) {
+        const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
+        t->photo_steps += fmax(1, (double)c.width * c.height / t->rules.step_pixels);
     }
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)

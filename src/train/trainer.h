@@ -40,6 +40,7 @@ struct trainer {
     uint64_t photos_hash, masks_hash; /* checkpoint_hash_photos() */
     size_t *train_views;              /* indices into scene.views */
     size_t train_count, test_count;
+    double photo_steps; /* steps that look once at all pixels of the training photos */
 
     /* What learns; its gradient and its Adam moments have the same shapes. */
     anchors anchors;

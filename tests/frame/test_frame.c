@@ -312,7 +312,8 @@ static void reaching_into_view(void **state)
     }
     uint32_t *visible = NULL;
     size_t count = 0, capacity = 0;
-    assert_ok(visible_find(frame_neural(&a, NULL), &bounds, &reach, NULL, &visible, &count, &capacity, NULL));
+    assert_ok(
+        visible_find(frame_neural(&a, NULL), &bounds, &reach, NULL, NULL, &visible, &count, &capacity, NULL));
     assert_int_equal(count, ANCHORS / 2);
     for (size_t i = 0; i < count; i++)
         assert_int_equal(visible[i], 2 * i);

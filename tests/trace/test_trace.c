@@ -472,7 +472,7 @@ static void one_order_to_the_stop(void **state)
     const gbt_camera camera = camera_at((double[3]){0, 0, 0}, (double[3]){0, 0, 5}, 16, 16, 6);
     ray_image rays = {0};
     assert_ok(ray_image_from_camera(&camera, &rays, NULL));
-    const figures f = compare(&g, &s, &rays, 64, 1e-6);
+    const figures f = compare(&g, &s, &rays, 64);
     assert_figures("to the stop", &f, 1e-5);
     assert_true(f.counters.blended > 5 * f.rays && f.counters.blended < COUNT * f.rays);
     ray_image_free(&rays);

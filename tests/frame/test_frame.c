@@ -321,11 +321,41 @@ static void reaching_into_view(void **state)
     anchors_free(&a);
 }
 
+/* Each draw leaves out others, and each anchor as often as is asked for. */
+static void left_out_at_random(void **state)
+{
+    (void)state;
+    enum { MANY = 4000, DRAWS = 3 };
+    anchors a = random_anchors(MANY, OFFSETS, 6);
+    const view_bounds all = view_bounds_none();
+    const visible_reach reach = {.sigmas = 3};
+    uint32_t *visible = NULL, seen[MANY] = {0};
+    size_t count, capacity = 0, in_all = 0;
+    for (uint64_t draw = 0; draw < DRAWS; draw++) {
+        const visible_chance chance = {.share = 0.25f, .seed = 7, .draw = draw};
+        assert_ok(visible_find(frame_neural(&a, NULL), &all, &reach, NULL, &chance, &visible, &count,
+                               &capacity, NULL));
+        assert_in_range(count, MANY * 0.72, MANY * 0.78);
+        for (size_t i = 0; i < count; i++)
+            seen[visible[i]]++;
+    }
+    for (size_t i = 0; i < MANY; i++)
+        in_all += seen[i] == DRAWS;
+    assert_in_range(in_all, MANY * 0.39, MANY * 0.46); /* 0.75^3 = 0.42 */
+    const visible_chance none = {.share = 0, .seed = 7};
+    assert_ok(
+        visible_find(frame_neural(&a, NULL), &all, &reach, NULL, &none, &visible, &count, &capacity, NULL));
+    assert_int_equal(count, MANY);
+    mem_free(visible);
+    anchors_free(&a);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_reached_is_left_out),
         cmocka_unit_test(reaching_into_view),
+        cmocka_unit_test(left_out_at_random),
         cmocka_unit_test(the_cone_is_narrow),
         cmocka_unit_test(a_camera_is_a_shot),
         cmocka_unit_test(a_tracer_of_the_caller),

@@ -82,7 +82,7 @@ run() { # NAME DATA OPTIONS...
     name=$1
     data=$2
     shift 2
-    "$program" train "$data" -o "$name" --iterations 40 --lossless --quiet "$@" >out 2>&1 || printf 'failed: %s: %s\n' "$name" "$(cat out)"
+    "$program" train "$data" -o "$name" --iterations ${steps:-40} --lossless --quiet "$@" >out 2>&1 || printf 'failed: %s: %s\n' "$name" "$(cat out)"
     rm -rf "$name"/checkpoints "$name"/*.json "$name"/*.csv "$name"/report.html "$name"/data_places "$name"/config
 }
 draw() { "$program" render "$@" --quiet >out 2>&1 || printf 'failed: %s: %s\n' "$*" "$(cat out)"; }
@@ -102,6 +102,9 @@ run pointless-run pointless
 run picked square
 run sky plain --background sky --views 2
 run poses plain --refine-poses --exposure --views 2
+steps=1400 # so many looks at each photo that steps leave anchors out
+run long plain
+steps=
 "$program" train plain -o goes-on --iterations 20 --quiet >/dev/null 2>&1
 "$program" train -o goes-on --resume --iterations 40 --lossless --quiet >out 2>&1 || cat out
 rm -rf goes-on/checkpoints goes-on/*.json goes-on/*.csv goes-on/report.html goes-on/data_places goes-on/config

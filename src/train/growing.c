@@ -147,7 +147,7 @@ static growth_def def_of(const trainer *t)
     if (!t->rules.thresholds_by_length)
         return def;
     /* What is left out is missed, so gradients and shares of the picture are larger. */
-    const float shown = 1 - step_left_out(t),
+    const float shown = 1 - t->left_out,
                 factor = (float)t->def.threshold_factor / (shown * shown) *
                          schedule_threshold_factor(t->def.views * pace_expected(&t->pace, t->step));
     const bool last = t->def.final_prune_factor > 1 &&

@@ -104,13 +104,6 @@ static const float *exposure_of(const trainer *t, size_t slot)
     return t->exposures.count > 0 ? t->exposures.matrix + slot * AFFINE_NUMBERS : NULL;
 }
 
-float step_left_out(const trainer *t)
-{
-    if (!t->rules.leaves_out)
-        return 0;
-    return schedule_left_out(t->def.views * pace_expected(&t->pace, t->step) / t->photo_steps);
-}
-
 void step_photos_pick(trainer *t)
 {
     for (int i = 0; i < t->def.views; i++)
@@ -121,10 +114,8 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
 {
     const size_t view = t->train_views[v->slot];
     const step_size size = size_of_step(t, view);
-    const bool loose = train_rules_are_loose(&t->rules, pace_progress(&t->pace, t->step));
-    v->frame.draw.chance = (visible_chance){.share = loose ? step_left_out(t) : 0,
-                                            .seed = t->def.seed,
-                                            .draw = (uint64_t)STREAM_LEFT_OUT << 48 | before};
+    v->frame.draw.chance = (visible_chance){
+        .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)STREAM_LEFT_OUT << 48 | before};
     v->outcome.level = size.level;
     v->outcome.parts = size.parts;
     photo_sample sample = pick_pixels(t, size, v->slot, before);

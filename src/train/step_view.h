@@ -84,9 +84,6 @@ gbt_status step_view_compare(step_view *v, const unsigned char *valid, const flo
 gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt_camera *camera, bool adjoint,
                           gbt_error *err);
 
-/** The part of the anchors in view that steps leave out at random (schedule_left_out()). */
-float step_left_out(const trainer *t);
-
 /** Nothing nearer to the camera of its photo is drawn. */
 float step_view_near(const trainer *t, const step_view *v);
 

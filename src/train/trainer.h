@@ -67,6 +67,7 @@ struct trainer {
     pace pace;
     char pace_words[PACE_TEXT_SIZE]; /* def.pace, where there is one: as files have it */
     uint64_t step;                   /* steps done */
+    float left_out;                  /* of the anchors in view of this step, at random: schedule_left_out() */
     uint64_t round_step;             /* steps done at the last round of growth */
     uint64_t anchor_t;               /* Adam steps of the per-anchor groups */
     uint64_t skipped_steps, skipped_in_row;

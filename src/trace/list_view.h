@@ -103,8 +103,8 @@ typedef struct gradient_slot {
     _Alignas(64) float sum[16];
 } gradient_slot;
 
-/* Sums of gradient_record, of the Gaussians or records of a block. Arrays 2048 bytes apart would compete for
-   the same lines of the cache. */
+/* Sums of gradient_record, of the Gaussians or records of a block. Arrays that lie 2,048 bytes apart would
+   compete for the same lines of the cache. */
 typedef struct block_sums {
     _Alignas(64) float sum[GRADIENT_FLOATS][VIEW_GRAIN + 16];
 } block_sums;

@@ -183,6 +183,7 @@ gbt_status cell_view_start(cell_drawer *d, const ray_shot *shot, gbt_error *err)
     if (ray_shot_sample_count(shot) > 1 || shot->aperture_radius > 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "memory: an open aperture is not drawn cell by cell (wanted rays from one point)");
+    ray_image_free(&d->rays); /* with the lenses of other pictures, which PIXEL_BYTES does not count */
     GBT_TRY(ray_image_from_shot(shot, 0, &d->rays, err));
     if (!d->rays.common_origin)
         return base_fail(

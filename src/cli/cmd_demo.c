@@ -2,6 +2,7 @@
 /* cli/cmd_demo.c -- gbtrace demo: make a scene, train on it, score it, report. */
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "cli/finish_run.h"
 #include "cli/options.h"
@@ -83,6 +84,10 @@ static int run(const operands *given)
              gbt_shell_word(data, data_word, sizeof data_word),
              gbt_shell_word(run_folder, run_word, sizeof run_word), 60 * minutes,
              (unsigned long long)train.seed);
+    char about[4200];
+    snprintf(about, sizeof about, "%s/SCENE.md", data);
+    if (access(data, F_OK) == 0 && access(about, F_OK) != 0)
+        return command_misused("%s: is there, and is no scene of gbtrace's (wanted another --output)", data);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = is_of_scene(run_folder);

@@ -153,7 +153,7 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
 {
     memset(log, 0, sizeof *log);
     log->last_row_seconds = t->seconds;
-    log->psnr_smooth = (double)NAN;
+    log->psnr_smooth = log->loss = (double)NAN;
     GBT_TRY(rewind_rows(log, csv_path, t->step, err));
     if (t->def.tensorboard)
         GBT_TRY(rewind_events(log, events_path, t->step, err));
@@ -240,13 +240,13 @@ static void tell_progress(const run_log *log, const trainer *t)
                    .seconds = t->seconds};
     e.seconds_left = t->pace.known < PACE_SEGMENTS ? fmax(0, t->def.budget_seconds - t->seconds) : left;
     e.psnr = log->psnr_smooth;
-    e.loss = r->loss;
+    e.loss = log->loss;
     e.anchors = t->anchors.count;
     e.gaussians = r->gaussians;
     snprintf(line, sizeof line,
              "step %llu  %3.0f %%  %dx%d  loss %.4f  psnr %.2f  anchors %zu  gaussians %zu  %.2f Mrays/s  "
              "%zu MB  %.0f:%02.0f left",
-             (unsigned long long)t->step, 100 * progress, r->width, r->height, r->loss, log->psnr_smooth,
+             (unsigned long long)t->step, 100 * progress, r->width, r->height, log->loss, log->psnr_smooth,
              t->anchors.count, r->gaussians, s->rays / fmax(seconds_of(s), 1e-9) * 1e-6,
              mem_peak_bytes() / 1000000, floor(e.seconds_left / 60), floor(fmod(e.seconds_left, 60)));
     log_progress(&e);
@@ -256,9 +256,11 @@ void run_log_step(run_log *log, const trainer *t, const step_report *report)
 {
     add_step(&log->row, report);
     add_step(&log->all, report);
-    if (compares(report))
+    if (compares(report)) {
+        log->loss = report->loss;
         log->psnr_smooth =
             log->all.compared == 1 ? report->psnr : 0.98 * log->psnr_smooth + 0.02 * report->psnr;
+    }
     log->last = *report;
     if (log_progress_due())
         tell_progress(log, t);

@@ -45,7 +45,8 @@ typedef struct run_log {
     FILE *events; /* NULL: none */
     event_records records;
     step_report last;
-    double last_row_seconds, psnr_smooth; /* NaN before any step that compares */
+    double last_row_seconds;
+    double psnr_smooth, loss; /* the mean, and of the last step that compares; NaN before any */
     double evaluated_seconds[GBT_TRAIN_MAX_EVALS], evaluated_psnr[GBT_TRAIN_MAX_EVALS];
     uint64_t evaluated_step[GBT_TRAIN_MAX_EVALS];
     int evaluated_count;

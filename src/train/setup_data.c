@@ -2,7 +2,6 @@
 /* train/setup_data.c -- from a folder to the photos and points of a run. */
 #include "train/setup_data.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +15,7 @@
 #include "train/memory_need.h"
 #include "train/seed_points.h"
 #include "train/seen_points.h"
+#include "train/step_size.h"
 
 /* ---- points ---- */
 
@@ -225,7 +225,8 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     }
     for (size_t i = 0; i < t->train_count; i++) {
         const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
-        t->photo_steps += fmax(1, (double)c.width * c.height / t->rules.step_pixels);
+        const int parts = step_size_of(&c, &t->rules, 1).parts;
+        t->photo_steps += (double)parts * parts;
     }
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)

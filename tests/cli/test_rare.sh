@@ -70,6 +70,8 @@ report $? "a list of held-out photos stays with the run" "$(cat err out; cat lis
 report $? "scores of other data leave the run's alone, from any folder" "$(cat err out)"
 holds "scores at more than the photos' size" 2 '^error: --downscale: 0.5 (wanted 1 to 64)$' eval run --downscale 0.5
 
+mkdir -p mine/scene && holds "the demo leaves data that are no scene of its own alone" 2 '^error: mine/scene: is there, and is no scene of ' demo -o mine && [ -z "$(ls mine/scene)" ]
+report $? "nor anything in their folder"
 mkdir shop && cp -r listed shop/run && holds "the demo leaves a run of other data alone" 2 '^error: shop/run: holds a run already ' demo -o shop --minutes 0.05 && cmp listed/model.gbt shop/run/model.gbt >out
 report $? "and its model" "$(cat out)"
 sed -i '3s|.*|../scene|' shop/run/data_places && holds "the demo trains its own run anew" 0 '^Report: shop/run/report.html$' demo -o shop --minutes 0.05 && ! cmp -s listed/model.gbt shop/run/model.gbt

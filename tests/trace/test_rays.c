@@ -96,7 +96,7 @@ static void plain_shots_are_cameras(void **state)
 static void lenses_are_kept(void **state)
 {
     (void)state;
-    const ray_shot shot = shot_of(GBT_CAMERA_OPENCV);
+    const ray_shot shot = shot_of(GBT_CAMERA_FISHEYE);
     ray_image kept = {0};
     for (int i = 0; i < 2 * (RAY_LENSES + 3); i++) {
         gbt_camera camera;

@@ -31,13 +31,3 @@ FASTEST_CLONE void adam_step(float *restrict param, float *restrict gradient, fl
         gradient[i] = 0;
     }
 }
-
-FASTEST_CLONE void adam_step_without_gradient(float *restrict param, float *restrict m, float *restrict v,
-                                              size_t count, adam_rates rates)
-{
-    for (size_t i = 0; i < count; i++) {
-        m[i] = rates.beta1 * m[i] + 0.0f; /* of -0 it is 0, as above */
-        v[i] = rates.beta2 * v[i];
-        param[i] -= rates.rate * (m[i] * rates.correct_m) / (sqrtf(v[i] * rates.correct_v) + 1e-15f);
-    }
-}

@@ -29,7 +29,4 @@ adam_rates adam_rates_of_views(double rate, uint64_t t, int views);
  */
 void adam_step(float *param, float *gradient, float *m, float *v, size_t count, adam_rates rates);
 
-/** The same where every gradient is 0 (not -0), same bits: it is neither read nor written. */
-void adam_step_without_gradient(float *param, float *m, float *v, size_t count, adam_rates rates);
-
 #endif

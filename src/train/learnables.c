@@ -13,7 +13,7 @@
 #include "train/adam.h"
 #include "train/schedule.h"
 
-enum { ADAM_BLOCK = 256, ADAM_GROUP = 16 /* anchors */ };
+enum { ADAM_BLOCK = 256 };
 
 typedef struct rate_rule {
     double first, last; /* of the reference: log-linear from one to the other over the run */
@@ -119,47 +119,21 @@ FASTEST_CLONE static void keep_between(float *values, size_t rows, size_t width,
             values[i] = larger(smaller(values[i], most[r]), least);
 }
 
-/* How many visible anchors come before `row`. */
-static size_t visible_before(const learning_model *m, size_t row)
-{
-    size_t low = 0, high = m->visible != NULL ? m->visible_count : 0;
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (m->visible[middle] < row)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-/* Rows [begin, end), all of one age. Groups without a gradient leave its memory alone. */
+/* Rows [begin, end), all of one age. */
 static void learn_rows(const anchor_job *job, size_t begin, size_t end)
 {
     const learning_model *m = job->m;
     const uint64_t age = job->age - m->created[begin];
-    const size_t first = visible_before(m, begin);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
         const rate_rule *rule = &anchor_rules[f];
-        const size_t width = anchors_width(m->anchors, f);
-        const adam_rates rates = adam_rates_of_views(job->rates->anchor[f],
-                                                     rule->ages_with_run ? job->age : age, job->rates->views);
-        float *values = m->anchors->field[f], *gradient = m->gradient->anchors.field[f],
-              *moment1 = m->moment1->anchors.field[f], *moment2 = m->moment2->anchors.field[f];
-        for (size_t i = begin, next, v = first; i < end; i = next) {
-            const size_t at = i * width, before = v;
-            next = smaller_size(i + ADAM_GROUP, end);
-            while (m->visible != NULL && v < m->visible_count && m->visible[v] < next)
-                v++;
-            const size_t count = (next - i) * width;
-            if (m->visible != NULL && v == before)
-                adam_step_without_gradient(values + at, moment1 + at, moment2 + at, count, rates);
-            else
-                adam_step(values + at, gradient + at, moment1 + at, moment2 + at, count, rates);
-        }
+        const size_t width = anchors_width(m->anchors, f), at = begin * width, count = (end - begin) * width;
+        float *values = m->anchors->field[f] + at;
+        adam_step(values, m->gradient->anchors.field[f] + at, m->moment1->anchors.field[f] + at,
+                  m->moment2->anchors.field[f] + at, count,
+                  adam_rates_of_views(job->rates->anchor[f], rule->ages_with_run ? job->age : age,
+                                      job->rates->views));
         if (rule->is_log_scale)
-            keep_between(values + begin * width, end - begin, width, m->scale_log_min,
-                         m->scale_log_max + begin);
+            keep_between(values, end - begin, width, m->scale_log_min, m->scale_log_max + begin);
     }
 }
 

@@ -52,9 +52,6 @@ typedef struct learning_model {
                               */
     decoder *decoder;
     learnables *gradient, *moment1, *moment2;
-    const uint32_t *visible; /* [visible_count], ascending: the gradient of all other anchors is 0 (not -0).
-                                NULL: any anchor may have one */
-    size_t visible_count;
     float scale_log_min;        /* every log-scale is kept above this */
     const float *scale_log_max; /* [anchors->count]: and those of anchor i below this */
 } learning_model;

@@ -25,15 +25,12 @@ enum { EMPTY_STEPS = 5 };
 
 static learning_model model_of(trainer *t)
 {
-    const frame *alone = t->def.views == 1 ? &t->views[0].frame : NULL; /* what it sees has a gradient */
     return (learning_model){.anchors = &t->anchors,
                             .created = t->created,
                             .decoder = &t->decoder,
                             .gradient = &t->gradient,
                             .moment1 = &t->moment1,
                             .moment2 = &t->moment2,
-                            .visible = alone != NULL ? alone->visible : NULL,
-                            .visible_count = alone != NULL ? alone->visible_count : 0,
                             .scale_log_min = t->scale_log_min,
                             .scale_log_max = t->scale_log_max};
 }

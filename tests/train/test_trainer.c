@@ -752,62 +752,6 @@ static void moments_follow_their_rows(void **state)
     trainer_free(&t);
 }
 
-/* With and without being told which anchors have a gradient. */
-static void anchors_out_of_view_learn_the_same(void **state)
-{
-    (void)state;
-    enum { COUNT = 600, OFFSETS = 2, TABLES = 4 };
-    decoder d;
-    assert_ok(decoder_init(&d, OFFSETS, false, 1, NULL));
-    static learnables tables[2][TABLES]; /* values, gradient, moments */
-    uint64_t created[COUNT];
-    uint32_t visible[COUNT];
-    float scale_log_max[COUNT];
-    size_t visible_count = 0;
-    for (uint32_t i = 0; i < COUNT; i++) {
-        created[i] = i / 250;
-        scale_log_max[i] = 0.5f;
-        if (i % 90 < 5)
-            visible[visible_count++] = i;
-    }
-    for (int told = 0; told < 2; told++) {
-        learnables *t = tables[told];
-        for (int k = 0; k < TABLES; k++) {
-            assert_ok(learnables_make(&t[k], COUNT, &d, NULL));
-            for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
-                const size_t width = anchors_width(&t[k].anchors, f);
-                for (size_t i = 0; i < COUNT * width; i++) {
-                    const float value = (float)(i * 7 % 101) / 50 - 1;
-                    t[k].anchors.field[f][i] = k == 1 && i / width % 90 >= 5 ? 0
-                                               : k == 2 && i % 11 == 0       ? -0.0f
-                                               : k == 3                      ? value * value
-                                                                             : value;
-                }
-            }
-        }
-        const learning_model m = {.anchors = &t[0].anchors,
-                                  .created = created,
-                                  .decoder = &d,
-                                  .gradient = &t[1],
-                                  .moment1 = &t[2],
-                                  .moment2 = &t[3],
-                                  .visible = told ? visible : NULL,
-                                  .visible_count = told ? visible_count : 0,
-                                  .scale_log_min = -5,
-                                  .scale_log_max = scale_log_max};
-        const learning_rates rates = learning_rates_at(0.3, true, 0, 1, 1, 0.1, 1);
-        learn_anchors(&m, &rates, 7);
-    }
-    for (int k = 0; k < TABLES; k++) {
-        for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
-            assert_memory_equal(tables[0][k].anchors.field[f], tables[1][k].anchors.field[f],
-                                COUNT * anchors_width(&tables[0][k].anchors, f) * sizeof(float));
-        learnables_free(&tables[0][k]);
-        learnables_free(&tables[1][k]);
-    }
-    decoder_free(&d);
-}
-
 /* ---- no sparse points ---- */
 
 /* The tiny scene's photos and cameras as a transforms.json, which has no points. */
@@ -2096,7 +2040,6 @@ int main(int argc, char **argv)
         cmocka_unit_test(growth_asks_for_two_views),
         cmocka_unit_test(new_geometry_begins_at_its_own_pace),
         cmocka_unit_test(moments_follow_their_rows),
-        cmocka_unit_test(anchors_out_of_view_learn_the_same),
         cmocka_unit_test(points_are_made_where_there_are_none),
         cmocka_unit_test(points_are_made_where_axes_do_not_meet),
         cmocka_unit_test(closed_folders_are_told_first),

@@ -301,32 +301,19 @@ typedef struct part_ball {
     float farthest, scale;
 } part_ball;
 
-/* A power of 2 that is at least expf(x), x at most 30, and above -80 at most 2.1 times it. */
-static float power_above_exp(float x)
-{
-    const float doublings = larger(x, -80) * 1.442695f;
-    const uint32_t bits = (uint32_t)(doublings + 128.01f) << 23; /* exponents count from -127 */
-    float power;
-    memcpy(&power, &bits, sizeof power);
-    return power;
-}
-
-/* With `roughly` nothing is smaller than without, and there are no calls of expf(). */
-static part_ball anchor_ball(const anchors *a, size_t i, bool roughly)
+static part_ball anchor_ball(const anchors *a, size_t i)
 {
     const float *l = a->scale_log + 6 * i;
-    const float logs[4] = {smaller(l[0], 30), smaller(l[1], 30), smaller(l[2], 30),
-                           smaller(larger(l[3], larger(l[4], l[5])), 30)};
-    float e[4];
-    for (int k = 0; k < 4; k++)
-        e[k] = roughly ? power_above_exp(logs[k]) : expf(logs[k]);
+    const float ex = expf(smaller(l[0], 30.0f)), ey = expf(smaller(l[1], 30.0f)),
+                ez = expf(smaller(l[2], 30.0f));
     const float *o = a->offset + 3 * (size_t)a->offset_count * i;
     float far_square = 0;
     for (int k = 0; k < a->offset_count; k++, o += 3) {
-        const float x = o[0] * e[0], y = o[1] * e[1], z = o[2] * e[2];
+        const float x = o[0] * ex, y = o[1] * ey, z = o[2] * ez;
         far_square = larger(x * x + y * y + z * z, far_square);
     }
-    return (part_ball){a->position + 3 * i, sqrtf(far_square), e[3]};
+    return (part_ball){a->position + 3 * i, sqrtf(far_square),
+                       expf(smaller(larger(l[3], larger(l[4], l[5])), 30.0f))};
 }
 
 static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
@@ -394,19 +381,12 @@ static bool may_be_met(const visible_job *job, size_t i)
     const anchors *a = job->subject.anchors;
     if (job->screen != NULL)
         return is_on_screen(job->screen, a, i);
+    /* An anchor in view is visible however far it reaches: most need no more. */
+    if (job->subject.cloud == NULL && job->bounds->plane_count > 0 &&
+        is_visible(job->bounds, a->position + 3 * i, 0))
+        return true;
+    const part_ball part = job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(a, i);
     const float pixel_min = job->reach->pixel_min != NULL ? job->reach->pixel_min[i] : 0;
-    /* Between planes what reaches farther sees no less. So an anchor in view is visible however far it
-       reaches, and one that is not with a bound of its reach is not: most need no more. */
-    if (job->subject.cloud == NULL && job->bounds->plane_count > 0) {
-        if (is_visible(job->bounds, a->position + 3 * i, 0))
-            return true;
-        const part_ball larger_part = anchor_ball(a, i, true);
-        if (!is_visible(job->bounds, larger_part.center,
-                        reach_of(&larger_part, job->reach, pixel_min, job->bounds->center)))
-            return false;
-    }
-    const part_ball part =
-        job->subject.cloud != NULL ? plain_ball(job->subject.cloud, i) : anchor_ball(a, i, false);
     return is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center));
 }
 

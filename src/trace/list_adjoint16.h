@@ -65,17 +65,12 @@ static void replay_list(const kernel_scene *scene, const used_list *used, const 
     for (size_t first = 0; first < count; first += TOGETHER) {
         const list_row *g[TOGETHER];
         row_response r[TOGETHER];
-        uint32_t number[TOGETHER], general = 0;
+        uint32_t number[TOGETHER];
         for (size_t k = 0; k < TOGETHER; k++) {
             number[k] = used_number[entry[first + k < count ? first + k : first].id];
             g[k] = &used_row[number[k]];
-            general |= g[k]->pair;
         }
-        respond_together(g, a, b, length, r, NULL);
-        if (general & ROW_GENERAL)
-            for (size_t k = 0; k < TOGETHER; k++)
-                if (g[k]->pair & ROW_GENERAL)
-                    r[k] = respond_general(scene, rays, g[k]->id);
+        respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (size_t k = 0; k < TOGETHER && first + k < count; k++) {
             const int i = (int)(first + k);
             const vfloat16 alpha = vfloat16_select(vmask16_from_bits(entry[i].lanes),
@@ -300,17 +295,12 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
         row_response r[TOGETHER];
         vfloat16 alpha[TOGETHER], clear[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
             v[TOGETHER][3];
-        uint32_t number[TOGETHER], general = 0;
+        uint32_t number[TOGETHER];
         for (size_t k = 0; k < TOGETHER; k++) {
             number[k] = used_number[entry[k < left ? left - 1 - k : 0].id];
             g[k] = &used_row[number[k]];
-            general |= g[k]->pair;
         }
-        respond_together(g, a, b, length, r, v);
-        if (general & ROW_GENERAL)
-            for (size_t k = 0; k < TOGETHER; k++)
-                if (g[k]->pair & ROW_GENERAL)
-                    r[k] = respond_general(scene, rays, g[k]->id);
+        respond_rows(scene, rays, g, a, b, length, r, v);
         for (size_t k = 0; k < TOGETHER; k++) {
             const vmask16 hit = vmask16_from_bits(entry[k < left ? left - 1 - k : 0].lanes);
             alpha[k] = vfloat16_select(hit, vfloat16_min(r[k].raw, alpha_max), zero);

@@ -54,16 +54,9 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
     for (unsigned first = 0; first < take; first += TOGETHER) {
         const list_row *g[TOGETHER];
         row_response r[TOGETHER];
-        uint32_t general = 0;
-        for (unsigned k = 0; k < TOGETHER; k++) {
+        for (unsigned k = 0; k < TOGETHER; k++)
             g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
-            general |= g[k]->pair;
-        }
-        respond_together(g, a, b, length, r, NULL);
-        if (general & ROW_GENERAL)
-            for (unsigned k = 0; k < TOGETHER; k++)
-                if (g[k]->pair & ROW_GENERAL)
-                    r[k] = respond_general(scene, rays, g[k]->id);
+        respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (unsigned k = 0; k < TOGETHER && first + k < take; k++)
             append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &sight);
     }

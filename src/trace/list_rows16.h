@@ -117,6 +117,21 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
     return (row_response){r.t, response_alpha(&g, r.d2), vfloat16_set1(0)};
 }
 
+/* respond_together(), by the general form where the other does not hold. */
+static inline __attribute__((always_inline)) void respond_rows(
+    const kernel_scene *scene, const packet_rays *rays, const list_row *const g[TOGETHER], vfloat16 a,
+    vfloat16 b, vfloat16 length, row_response r[TOGETHER], vfloat16 v[TOGETHER][3])
+{
+    uint32_t pairs = 0;
+    respond_together(g, a, b, length, r, v);
+    for (int k = 0; k < TOGETHER; k++)
+        pairs |= g[k]->pair;
+    if (pairs & ROW_GENERAL)
+        for (int k = 0; k < TOGETHER; k++)
+            if (g[k]->pair & ROW_GENERAL)
+                r[k] = respond_general(scene, rays, g[k]->id);
+}
+
 static inline const list_row *row_at(const tile_list *list, const list_rows *rows, size_t place)
 {
     return &list->row[rows->number[rows->order[place]]];

@@ -70,9 +70,9 @@ float schedule_threshold_factor(double steps);
 double schedule_rate_end(double steps);
 
 /**
- * The part of the anchors in view that a step leaves out at random, [0, 0.3], until SCHEDULE_EXACT_FROM: 0 up
- * to 100 looks at each photo, then rising, 0.3 from 300 on. A step that looks at a part of a photo is as much
- * of a look.
+ * The part of the anchors in view that each step until SCHEDULE_EXACT_FROM leaves out at random: 0 up to 100
+ * `looks` at each photo, then rising, 0.3 from 300 on. Looks are those of the whole run, as far as its length
+ * is known (pace_expected()); of photos large enough for n parts every step is 1/n look.
  *
  * What looks at its photos so often fits them better than it fits the scene. Anchors that cannot count on
  * each other come to stand where all photos want them (docs/training.md).

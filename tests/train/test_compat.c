@@ -185,6 +185,21 @@ static void anchors_rest_in_a_round(void **state)
     trainer_free(&t);
 }
 
+static void long_runs_leave_anchors_out(void **state)
+{
+    (void)state;
+    for (int compat = 0; compat <= 1; compat++) {
+        gbt_train_def def = def_of(compat == 1);
+        def.iterations = 300 * VIEWS;
+        trainer t;
+        step_report r;
+        open_ok(&t, tiny, &def);
+        step_ok(&t, &r);
+        assert_true((t.left_out > 0) == (compat == 0));
+        trainer_free(&t);
+    }
+}
+
 /* The other rules, whose effects are tested where they act; and what they make of settings and scene. */
 static void the_other_rules_are_the_references(void **state)
 {
@@ -351,6 +366,7 @@ int main(void)
         cmocka_unit_test(rates_count_from_one),
         cmocka_unit_test(the_last_step_teaches_nothing),
         cmocka_unit_test(anchors_rest_in_a_round),
+        cmocka_unit_test(long_runs_leave_anchors_out),
         cmocka_unit_test(the_other_rules_are_the_references),
         cmocka_unit_test(faint_gaussians_count),
         cmocka_unit_test(nothing_is_nearer_than_a_fifth),

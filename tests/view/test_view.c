@@ -386,13 +386,6 @@ static void wait_for_version(int port, int version)
     fail_msg("version %d has not come", version);
 }
 
-static void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
-    mem_free(b.data);
-}
-
 static void newer_models_are_shown(void **state)
 {
     (void)state;

@@ -8,6 +8,7 @@
 #include "data/bytes.h"
 #include "io/safetensors.h"
 #include "io/scaffold_file.h"
+#include "write_text.h"
 
 enum { ANCHORS = 40, OFFSETS = 10, FEATURES = 32, HIDDEN = 32, INPUTS = 35 };
 
@@ -273,28 +274,23 @@ static void refused(const char *says, gbt_status status)
     assert_null(m.anchors.position);
 }
 
-static void write_text(const char *name, const char *text)
-{
-    assert_ok(file_write_atomic(test_path(name), text, strlen(text), NULL));
-}
-
 static void says_what_is_wrong(void **state)
 {
     (void)state;
     write_model(0);
     unlink(test_path("cov_mlp.safetensors"));
     refused("cov_mlp.safetensors: cannot open", GBT_ERR_IO);
-    write_text("cov_mlp.pt", "");
+    write_text(test_path("cov_mlp.pt"), "");
     refused("torch.jit.load(n + '_mlp.pt', 'cpu')", GBT_ERR_IO);
     unlink(test_path("cov_mlp.pt"));
-    write_text("checkpoints.pth", "");
+    write_text(test_path("checkpoints.pth"), "");
     refused("torch.load('checkpoints.pth', 'cpu').items()]\"", GBT_ERR_IO);
     unlink(test_path("checkpoints.pth"));
     write_network(1);
-    write_text("feature_bank_mlp.pt", "");
+    write_text(test_path("feature_bank_mlp.pt"), "");
     refused("a feature bank is not supported", GBT_ERR_FORMAT);
     unlink(test_path("feature_bank_mlp.pt"));
-    write_text("mlp_feature_bank.safetensors", "");
+    write_text(test_path("mlp_feature_bank.safetensors"), "");
     refused("mlp_feature_bank.safetensors: a feature bank is not supported", GBT_ERR_FORMAT);
     unlink(test_path("mlp_feature_bank.safetensors"));
     scaffold.first[2].in = 36 + 32;
@@ -308,8 +304,9 @@ static void says_what_is_wrong(void **state)
     scaffold.second[2].bias[3] = (double)NAN;
     write_network(2);
     refused("array 2.bias: value 3 is not finite", GBT_ERR_FORMAT);
-    write_text("point_cloud.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
-                                  "y\nproperty float z\nend_header\n1 2 3\n");
+    write_text(test_path("point_cloud.ply"),
+               "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
+               "y\nproperty float z\nend_header\n1 2 3\n");
     refused("no number f_anchor_feat_0 (wanted anchors of Scaffold-GS)", GBT_ERR_FORMAT);
 }
 

@@ -11,6 +11,7 @@
 #include "gbtrace/model.h"
 #include "gbtrace/train.h"
 #include "remove_tree.h"
+#include "write_text.h"
 
 enum { W = 9, H = 7, COUNT = 2 };
 
@@ -161,14 +162,6 @@ static void views_stay_with_other_gaussians(void **state)
         assert_true(fabs(before.camera.center[k] - after.camera.center[k]) < 1e-12);
     gbt_model_close(model);
     assert_int_equal(remove_tree(folder), 0);
-}
-
-static void write_text(const char *path, const char *text)
-{
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
 }
 
 /* Quaternions of length 2, opacities as logits. The second row is not usable, the third out of view. */

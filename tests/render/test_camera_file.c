@@ -6,6 +6,7 @@
 #include "base/near.h"
 #include "exr_file.h"
 #include "render/camera_file.h"
+#include "write_text.h"
 
 static char folder[] = "/tmp/gbt_camera_XXXXXX", path[64], rays_path[64];
 static const double none[3] = {0, 0, 0};
@@ -28,11 +29,6 @@ static int remove_folder(void **state)
     return rmdir(folder);
 }
 
-static void write_text(const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
-}
-
 #define POSE                                                                                                 \
     "\"origin\": [1, 2, 3], \"target\": [1, 2, 13], \"up\": [0, -2, 0], \"width\": 64, \"height\": 32"
 
@@ -40,7 +36,7 @@ static camera_file read_good(const char *text, const double origin[3])
 {
     camera_file file;
     gbt_error err = {0};
-    write_text(text);
+    write_text(path, text);
     if (camera_file_read(path, origin, &file, &err) != GBT_OK)
         fail_msg("%s: %s", text, err.text);
     return file;
@@ -130,7 +126,7 @@ static void rays_beside_it(void **state)
     exr_write(rays_path, 2, 1, 6, names, 2, pixels);
     camera_file f;
     gbt_error err = {0};
-    write_text("{\"rays\": \"r.exr\"}");
+    write_text(path, "{\"rays\": \"r.exr\"}");
     if (camera_file_read(path, shift, &f, &err) != GBT_OK)
         fail_msg("%s", err.text);
     assert_ptr_equal(f.shot.given, &f.rays);
@@ -220,7 +216,7 @@ static void says_what_is_wrong(void **state)
     for (size_t i = 0; i < sizeof bad_cases / sizeof *bad_cases; i++) {
         camera_file f;
         gbt_error err = {0};
-        write_text(bad_cases[i].text);
+        write_text(path, bad_cases[i].text);
         const gbt_status status = camera_file_read(path, none, &f, &err);
         const size_t length = strlen(path);
         if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 ||
@@ -233,7 +229,7 @@ static void says_what_is_wrong(void **state)
     gbt_error err = {0};
     assert_int_equal(camera_file_read("/nowhere/c.json", none, &f, &err), GBT_ERR_IO);
     camera_file_free(&f);
-    write_text("{\"rays\": \"nothing.exr\"}");
+    write_text(path, "{\"rays\": \"nothing.exr\"}");
     memset(&err, 0, sizeof err);
     assert_int_equal(camera_file_read(path, none, &f, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "nothing.exr: cannot open"));

@@ -15,6 +15,7 @@
 #include "render/camera_path_file.h"
 #include "render/video.h"
 #include "train/camera_sees.h"
+#include "write_text.h"
 
 #define PI 3.14159265358979323846
 static char folder[] = "/tmp/gbt_path_XXXXXX", file_path[64], beside_path[96];
@@ -463,11 +464,6 @@ static void order_to_go_through(void **state)
 }
 
 /* ---- files ---- */
-
-static void write_text(const char *path, const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
-}
 
 static camera_path read_good(const char *text, const double origin[3], size_t frames)
 {

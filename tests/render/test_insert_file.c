@@ -7,14 +7,10 @@
 #include "base/memory.h"
 #include "base/near.h"
 #include "render/insert_file.h"
+#include "write_text.h"
 
 static char folder[] = "/tmp/gbt_insert_XXXXXX", path[64], mesh_path[64];
 static const double none[3] = {0, 0, 0};
-
-static void write_text(const char *file, const char *text)
-{
-    assert_ok(file_write_atomic(file, text, strlen(text), &assert_ok_err_));
-}
 
 static int make_folder(void **state)
 {

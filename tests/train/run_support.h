@@ -50,6 +50,13 @@ static inline bytes read_bytes(const char *path)
     return b;
 }
 
+static inline void copy_file(const char *from, const char *to)
+{
+    bytes b = read_bytes(from);
+    assert_ok(file_write_atomic(to, b.data, b.count, &assert_ok_err_));
+    mem_free(b.data);
+}
+
 static inline void assert_same_file(const char *a, const char *b)
 {
     bytes x = read_bytes(a), y = read_bytes(b);

@@ -11,6 +11,7 @@
 #include "run/loaded_run.h"
 #include "train/align.h"
 #include "train/pose_file.h"
+#include "write_text.h"
 
 /* The small turn from one camera to another, in world axes: the antisymmetric part of A^T B. */
 static void turn_between(const gbt_camera *from, const gbt_camera *to, double axis[3])
@@ -214,11 +215,6 @@ static void whoever_opens_the_run_has_them(void **state)
     assert_true(moved > 1e-6 && moved < 0.1);
     loaded_run_close(&run);
     loaded_run_close(&of_data);
-}
-
-static void write_text(const char *path, const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
 }
 
 static void what_is_no_pose_is_refused(void **state)

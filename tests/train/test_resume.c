@@ -10,6 +10,7 @@
 #include "io/model_file.h"
 #include "quiet.h"
 #include "train/config.h"
+#include "write_text.h"
 
 static gbt_train_def resume_def(uint64_t iterations, double budget_seconds)
 {
@@ -246,11 +247,6 @@ static void what_a_run_left_alone_stays(void **state)
                                   "a run is resumed with its own settings: background = constant, not sky\n"
                                   "a run is resumed with its own settings: refine-poses = 0, not 1\n");
     assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
-}
-
-static void write_text(const char *path, const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
 }
 
 /* What becomes of the list that was named, and where the run is gone on with, decides nothing. */

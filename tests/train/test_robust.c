@@ -34,13 +34,6 @@ static const char *joined(const char *folder, const char *name)
 
 /* ---- scenes ---- */
 
-static void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
-    mem_free(b.data);
-}
-
 /* A data set like `from`, whose photos `change` has gone over. They become EXR files under their old names:
    magic decides. */
 static void copy_scene(const char *from, const char *folder, void (*change)(image *photo, size_t view))

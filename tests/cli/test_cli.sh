@@ -178,6 +178,8 @@ misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render noth
 misuse 2 "--downscale: not with a camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
 misuse 2 "--insert: meshes are traced (wanted the renderer trace)" render nothing -o o --insert i.json --renderer reference
 mkdir empty
+misuse 4 "empty/model.gbt: not there (wanted a run, a model file or plain Gaussians)" render empty && [ -z "$(ls empty)" ]
+report $? "and nothing is made in it" "$(ls empty)"
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
 misuse 3 "short.gbt: too short for a gbtrace file (wanted at least 64 bytes, got 8)" info short.gbt
@@ -316,6 +318,7 @@ misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
 printf '{"model": "equirectangular", "width": 16384, "height": 16384, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
 misuse 2 "large: a picture of 16384 x 16384 pixels (wanted at most 178956970 pixels)" render tiny -o o --camera large.json
 misuse 2 "film.MOV: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
+misuse 2 "picture.PNG: wanted a folder (the picture is named after its camera or view)" render tiny -o picture.PNG --camera c.json
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
 for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--path orbit" "--preset fast" "--renderer raster"; do
@@ -620,7 +623,8 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
     misuse 2 "small.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json small.gbt
     misuse 2 "run/model.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json run/model.gbt
-    misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
+    misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o unmade --outputs hits,dept && [ ! -e unmade ]
+    report $? "and nothing is made"
 else
     report 1 "a run to render" "$(cat err)"
 fi

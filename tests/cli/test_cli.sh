@@ -44,6 +44,14 @@ for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
     "$program" "$command" --help >out 2>err && awk 'length($0) > 100 || NR > 40 { print FILENAME ": line " NR; bad = 1 } END { exit bad }' out >>err
     report $? "help of $command fits a screen: 40 lines of 100 columns" "$(cat err)"
 done
+for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
+    for option in $("$program" "$command" --help-all | awk '/^  -., --/ || /^      --/ { match($0, /--[a-z-]+/); name = substr($0, RSTART, RLENGTH); text = "" }
+        { text = text " " $0 } name != "" && text ~ / 0: / { print name; name = "" }'); do
+        "$program" "$command" "$option" 0 '' >out 2>err
+        [ $? = 2 ] && grep -q '^error: argument 1 is empty' err
+        report $? "$command $option: what the help says of 0 is taken" "$(cat err)"
+    done
+done
 prints "rare options are in the whole help" '^      --final-prune-factor F .*' train --help-all
 "$program" train --help | grep -q -e '--final-prune-factor' -e '--pace' -e '--distance'
 [ $? = 1 ]
@@ -387,6 +395,7 @@ done
 grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
+prints "options of 0 leave it to the preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0 --alpha-max 0 --t-min 0
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9
 misuse 2 '--kernel: "tile,tile" (wanted list, packet, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow

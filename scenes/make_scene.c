@@ -306,8 +306,6 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
         if (status == GBT_OK)
             status = surface_gaussians_write(w, path, (size_t)def->gaussians, def->seed, err);
     }
-    if (status == GBT_OK)
-        status = write_about(r, def, folder, err);
 done:
     mem_free(cameras);
     mem_free(names);
@@ -344,6 +342,7 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
     GBT_TRY(make_folder(folder, "images", err));
     if (def->depth)
         GBT_TRY(make_folder(folder, "depth", err));
+    GBT_TRY(write_about(r, def, folder, err)); /* first: it says whose folder this is, however far it came */
     world w = {.err = err};
     r->build(&w);
     /* A rough picture gets rough light: the default number of samples gets all of it. */

@@ -140,9 +140,10 @@ typedef struct gbt_render_def {
 gbt_render_def gbt_render_def_default(void);
 
 /**
- * Render the views of a split into the folder `out`, one file per view; or what a camera file says, as one
- * file of its name; or a path, as frame_00001.png and so on, or as one film when `out` ends in .mp4, .webm or
- * .gif (by the program ffmpeg, which must be there).
+ * Render the views of a split into the folder `out`, made when it is missing, one file per view (not over the
+ * scored pictures of a run with exposures, RUN/renders/test: GBT_ERR_ARGUMENT); or what a camera file says,
+ * as one file of its name; or a path, as frame_00001.png and so on, or as one film when `out` ends in .mp4,
+ * .webm or .gif (by the program ffmpeg, which must be there).
  *
  * Camera models are traced as they are. `data`, `split` and `downscale` are about views: with a camera file
  * or a path file `split` is not used, and the others are refused. A film has its name when it is whole, not

@@ -28,8 +28,7 @@ gbt_import_def gbt_import_def_default(void);
  * @param input [in] Scaffold-GS's result folder (the newest point_cloud/iteration_N counts), or its
  *                   point_cloud.ply; the networks are opacity_mlp.safetensors, cov_mlp.safetensors and
  *                   color_mlp.safetensors beside the .ply (docs/formats.md)
- * @param run   [in] folder, made when it is not there; a model.gbt that was imported before is replaced
- * atomically, a folder with a trained run is refused
+ * @param run   [in] folder, made when it is not there; one with a run, trained or imported, is refused
  * @param report [in] open stream for one line; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  *

@@ -291,6 +291,8 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
     gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     const frame_drawing drawing = f->draw;
     f->draw.renderer = GBT_RENDERER_TRACE;
+    if (status == GBT_OK && camera_count > 0)
+        log_count("bake", 0, camera_count, (double)NAN);
     for (size_t i = 0; i < camera_count && status == GBT_OK; i++) {
         status = add_view(&b, f, d, &cameras[i], &settings[i], err);
         log_count("bake", i + 1, camera_count, (double)NAN);

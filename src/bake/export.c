@@ -374,8 +374,10 @@ static json_t *file_to_json(const exporting *e, const exported *f)
         if (f->shown != f->baked)
             json_object_set_new(row, "psnr_to_bake", json_number(f->to_bake));
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
-        json_object_set_new(row, "psnr_to_photos", json_number(f->to_photo));
-        json_object_set_new(row, "model_psnr_to_photos", json_number(e->model_to_photo));
+        if (!e->run.def.exposure) {
+            json_object_set_new(row, "psnr_to_photos", json_number(f->to_photo));
+            json_object_set_new(row, "model_psnr_to_photos", json_number(e->model_to_photo));
+        }
     }
     return row;
 }

@@ -10,6 +10,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
@@ -218,6 +219,9 @@ static gbt_status save_under(const char *folder, const char *name, const char *m
 gbt_status export_folder_scores(const char *folder, const loaded_run *r, const image_scores *scores,
                                 const lpips_scores *with_network, size_t count, gbt_error *err)
 {
+    if (r->def.exposure)
+        log_warn("%s: results.json has scores of whole pictures, without the photos' colour matrices",
+                 folder);
     char method[64];
     score_list lists[] = {{.name = "SSIM", .values = json_object()},
                           {.name = "PSNR", .values = json_object()},

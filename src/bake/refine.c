@@ -131,6 +131,8 @@ gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, cons
     refining r = {.frame.draw.footprint = teacher->draw.footprint};
     gbt_status status = open_state(&r, cloud, err);
     const int pixel_step = teacher->draw.pixel_step;
+    if (status == GBT_OK && def->steps > 0)
+        log_count("refine", 0, (uint64_t)def->steps, (double)NAN);
     for (int i = 0; i < def->steps && status == GBT_OK; i++) {
         uint32_t words[4];
         rng_philox(def->seed, STREAM, (uint64_t)i, words);

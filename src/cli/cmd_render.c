@@ -97,7 +97,8 @@ static const option *options(int *count)
          .min = 0,
          .max = 100000,
          .value_name = "N",
-         .help = "number of frames; 0: 240 for an orbit, 15 per photo, or all of a path file"},
+         .help =
+             "number of frames; 0: 240 for an orbit, 15 per photo but 900 at most, or all of a path file"},
         {.name = "fps",
          .kind = OPTION_DOUBLE,
          .value = &def.fps,

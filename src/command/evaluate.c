@@ -4,6 +4,7 @@
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>
+#include <math.h>
 
 #include "base/choice.h"
 #include "base/def.h"
@@ -36,8 +37,10 @@ static void log_scores(const evaluation *e)
     if (e->lpips_network != NULL)
         snprintf(more, sizeof more, ", LPIPS (%s) %.4f, in [0, 1] %.4f", e->lpips_network, e->lpips.lpips,
                  e->lpips.lpips_01);
-    if (e->view_count == 0) {
-        log_info("no held-out views: scores are n/a");
+    if (e->view_count == 0 || isnan(e->psnr)) {
+        const char *why =
+            e->view_count == 0 ? "no held-out views" : "no held-out view has a pixel that counts";
+        log_info("%s: scores are n/a", why);
         return;
     }
     log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s%s", e->view_count, e->psnr, e->ssim,

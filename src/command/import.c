@@ -93,10 +93,14 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
 /* Before any work. */
 static gbt_status check_places(const char *run, const gbt_import_def *def, gbt_error *err)
 {
+    static const char *const names[] = {"config", "model.gbt"};
     char path[RESULT_PATH_SIZE];
-    GBT_TRY(file_join(path, sizeof path, run, "config", err));
-    if (file_exists(path))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: holds a trained run (wanted another folder)", run);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        GBT_TRY(file_join(path, sizeof path, run, names[i], err));
+        if (file_exists(path))
+            return base_fail(err, GBT_ERR_ARGUMENT, "%.1000s: holds a trained run (wanted another folder)",
+                             run);
+    }
     return def->data == NULL || file_exists(def->data)
                ? GBT_OK
                : base_fail(err, GBT_ERR_IO, "%.1000s: the data set is not there", def->data);

@@ -66,6 +66,8 @@ static gbt_status score_own_views(loaded_run *r, const lpips *net, const char *f
 {
     const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
     size_t index = 0, own = 0;
+    if (e->view_count > 0)
+        log_count("score", 0, e->view_count, (double)NAN);
     for (size_t i = 0; i < r->scene.view_count; i++) {
         if (!r->scene.views[i].is_test || index++ % size != rank)
             continue;

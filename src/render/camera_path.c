@@ -185,13 +185,18 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
 
 /* ---- through cameras ---- */
 
-enum { DIMENSIONS = 7, STEPS = 64 /* of a segment, to measure its length */ };
+enum {
+    POSE = 7, /* centre, 2 L q */
+    ZOOM = POSE,
+    DIMENSIONS,
+    STEPS = 64 /* of a segment, to measure its length */
+};
 
 typedef struct pose_curve {
     const gbt_camera *keys;
     size_t *key;                 /* [count]: index of the camera; equal neighbours are left out */
-    double (*point)[DIMENSIONS]; /* [count]: centre, 2 L q */
-    double (*slope)[DIMENSIONS]; /* [count]: by the knot's parameter */
+    double (*point)[DIMENSIONS]; /* [count]: centre, 2 L q, L log zoom */
+    double (*slope)[DIMENSIONS]; /* [count]: by the knot's parameter; of the pose */
     double *gap;                 /* [count - 1]: from knot to knot */
     size_t count;
     double turn_length;
@@ -205,8 +210,9 @@ static double distance_of(const double *a, const double *b)
     return sqrt(sum);
 }
 
-/** The point of a camera; its quaternion on the side of `before` (NULL: any). */
-static void point_of(const gbt_camera *camera, double turn_length, const double *before,
+/** The point of a camera; its quaternion on the side of `before` (NULL: any). `focal`: params[0], which
+    is a length in pixels in every model, of the lens whose zoom is 1. */
+static void point_of(const gbt_camera *camera, double focal, double turn_length, const double *before,
                      double out[DIMENSIONS])
 {
     double q[4], dot = 0;
@@ -217,6 +223,7 @@ static void point_of(const gbt_camera *camera, double turn_length, const double 
         out[k] = camera->center[k];
     for (int k = 0; k < 4; k++)
         out[3 + k] = (dot < 0 ? -2 : 2) * turn_length * q[k];
+    out[ZOOM] = turn_length * log(camera->params[0] / focal);
 }
 
 /** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of
@@ -224,7 +231,7 @@ static void point_of(const gbt_camera *camera, double turn_length, const double 
 static void find_slopes(pose_curve *c)
 {
     for (size_t i = 0; i < c->count; i++)
-        for (int k = 0; k < DIMENSIONS; k++) {
+        for (int k = 0; k < POSE; k++) {
             const double left = i > 0 ? (c->point[i][k] - c->point[i - 1][k]) / c->gap[i - 1] : 0;
             const double right = i + 1 < c->count ? (c->point[i + 1][k] - c->point[i][k]) / c->gap[i] : left;
             if (i == 0 || i + 1 == c->count)
@@ -246,7 +253,7 @@ static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_l
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < count; i++) {
         const size_t n = c->count;
-        point_of(&keys[i], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
+        point_of(&keys[i], keys[0].params[0], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
         const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1]) : 0;
         if (n > 0 && !(way > 1e-9 * turn_length))
             continue;
@@ -266,7 +273,8 @@ static void curve_free(pose_curve *c)
     mem_free(c->gap);
 }
 
-/** Centre and unit quaternion, times 2 L, at u in [0, 1] of a segment. */
+/** Centre, unit quaternion times 2 L, and L log zoom, at u in [0, 1] of a segment. Zoom is not smooth at the
+    keys, for the lens is not. */
 static void curve_at(const pose_curve *c, size_t segment, double u, double out[DIMENSIONS])
 {
     if (c->count == 1) {
@@ -276,13 +284,14 @@ static void curve_at(const pose_curve *c, size_t segment, double u, double out[D
     const double v = 1 - u, h00 = v * v * (1 + 2 * u), h01 = u * u * (3 - 2 * u),
                  h10 = u * v * v * c->gap[segment], h11 = -u * u * v * c->gap[segment];
     double length = 0;
-    for (int k = 0; k < DIMENSIONS; k++)
+    for (int k = 0; k < POSE; k++)
         out[k] = h00 * c->point[segment][k] + h01 * c->point[segment + 1][k] + h10 * c->slope[segment][k] +
                  h11 * c->slope[segment + 1][k];
-    for (int k = 3; k < DIMENSIONS; k++)
+    for (int k = 3; k < POSE; k++)
         length += out[k] * out[k];
-    for (int k = 3; k < DIMENSIONS; k++)
+    for (int k = 3; k < POSE; k++)
         out[k] *= 2 * c->turn_length / sqrt(length);
+    out[ZOOM] = v * c->point[segment][ZOOM] + u * c->point[segment + 1][ZOOM];
 }
 
 static void set_camera(const pose_curve *c, size_t segment, double u, gbt_camera *out)
@@ -348,12 +357,12 @@ gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn
     return status;
 }
 
-/** Centre, and 2 L q with either sign: the nearer counts. */
+/** Centre, and 2 L q with either sign: the nearer counts. Lenses do not: the way has one for all. */
 static double way_between(const gbt_camera *a, const gbt_camera *b, double turn_length)
 {
     double p[DIMENSIONS], q[DIMENSIONS];
-    point_of(a, turn_length, NULL, p);
-    point_of(b, turn_length, p, q);
+    point_of(a, a->params[0], turn_length, NULL, p);
+    point_of(b, b->params[0], turn_length, p, q);
     return distance_of(p, q);
 }
 

@@ -52,8 +52,9 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
  *
  * One Catmull-Rom curve (centripetal, Yuksel 2011: no loops, no cusps) through the points (centre, 2 L q), q
  * the unit quaternion with the sign nearer to the one before; q is made unit again. Then frames at even steps
- * of sqrt(|dx|^2 + (L angle)^2), L = turn_length: turning by an angle counts as much as moving far enough to
- * turn the view of something L away by it. The lens goes from key to key with the curve.
+ * of sqrt(|dx|^2 + (L angle)^2 + (L log zoom)^2), L = turn_length: turning by an angle counts as much as
+ * moving far enough to turn the view of something L away by it, zooming as much as going nearer to something
+ * L away. The lens goes from key to key with the curve.
  *
  * @param keys        [in] [count], count >= 1, of one model and size
  * @param turn_length [in] L, > 0
@@ -66,7 +67,7 @@ gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn
 /**
  * Put cameras in an order to go through: as they are (by name: often as they were taken), unless going on to
  * the nearest one each time, from the first on, makes a way less than two thirds as long. Lengths as in
- * camera_path_through().
+ * camera_path_through(), of one lens.
  *
  * @param cameras [in, out] [count]
  * Cost: O(count^2).

@@ -140,6 +140,7 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
 {
     loaded_run *r = &st->run;
     size_t index = 0;
+    log_count("render", 0, wanted, (double)NAN);
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
         if (!is_wanted(view, def->split) || !is_own(st, index++))
@@ -400,6 +401,8 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
             "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
             "trace, no outputs, no meshes)");
     if (large)
+        GBT_TRY(file_make_folder(folder, err)); /* for the temporary file */
+    if (large)
         GBT_TRY(loaded_run_open_cells(run, def->memory, folder, r, err));
     if (large)
         return wants_views(def) ? loaded_run_open_views(run, def->data, def->downscale, r, err) : GBT_OK;
@@ -407,11 +410,27 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
                             : loaded_run_open_model(run, r, err);
 }
 
+/* The scored pictures of a run with exposures went through colour matrices, what is drawn here does not. */
+static gbt_status check_scored(const loaded_run *r, const char *out, const gbt_render_def *def,
+                               gbt_error *err)
+{
+    char scored[4096];
+    if (!r->def.exposure || def->camera != NULL || def->path != NULL || def->split == GBT_SPLIT_TRAIN)
+        return GBT_OK;
+    GBT_TRY(file_join(scored, sizeof scored, r->data.folder, "renders/test", err));
+    return !file_is_same(out, scored)
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT,
+                           "%s: holds the scored pictures, through the photos' colour matrices (wanted "
+                           "another folder)",
+                           out);
+}
+
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     PLAIN_NUMBERS;
     GBT_TRY(check_def(out, def, err));
-    GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_make_folder(out, err));
+    GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_check_folder_creatable(out, err));
     studio *st = mem_calloc(1, sizeof *st, "run", err);
     if (st == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -419,11 +438,15 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     if (status == GBT_OK)
         status = open_run(run, out, def, &st->run, err);
     if (status == GBT_OK)
+        status = check_scored(&st->run, out, def, err);
+    if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &st->run.settings, err);
     if (status == GBT_OK)
         status = choose_renderer(st, def, err);
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
+    if (status == GBT_OK && !video_named(out)) /* not before it is known that there is something to draw */
+        status = file_make_folder(out, err);
     status = cluster_agree(status, err);
     if (status == GBT_OK)
         status = def->path != NULL     ? render_film(st, out, def, err)

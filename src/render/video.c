@@ -67,6 +67,11 @@ gbt_status video_check_name(const char *path, gbt_error *err)
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)",
                              path);
+    static const char *const pictures[] = {".png", ".jpg", ".jpeg", ".exr"};
+    for (size_t i = 0; i < sizeof pictures / sizeof *pictures; i++)
+        if (file_ends_with(path, pictures[i]))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "%s: wanted a folder (the picture is named after its camera or view)", path);
     return GBT_OK;
 }
 

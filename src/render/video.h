@@ -10,7 +10,8 @@
 /** Whether a file of this name is a film: .mp4 (H.264), .webm (VP9) or .gif. */
 bool video_named(const char *path);
 
-/** GBT_ERR_ARGUMENT where it ends as another kind of film, as .mov: nobody means a folder by it. */
+/** GBT_ERR_ARGUMENT where it ends as a picture or another kind of film, as .mov: nobody means a folder by it.
+ */
 gbt_status video_check_name(const char *path, gbt_error *err);
 
 typedef struct video video;

@@ -135,10 +135,14 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
     char path[4096];
     if (gaussian_file_readable(run))
         return open_cloud(run, out, err);
-    if (file_is_folder(run))
+    const bool folder = file_is_folder(run);
+    if (folder)
         GBT_TRY(file_join(path, sizeof path, run, "model.gbt", err));
     else if (snprintf(path, sizeof path, "%s", run) >= (int)sizeof path)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
+    if (folder && !file_exists(path))
+        return base_fail(err, GBT_ERR_IO,
+                         "%.1000s: not there (wanted a run, a model file or plain Gaussians)", path);
     GBT_TRY(model_load(path, &out->model, err));
     out->def = gbt_train_def_default();
     out->def.footprint = 0; /* of models that do not say */

@@ -162,5 +162,9 @@ gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *
     if (status == GBT_OK)
         status = finish(s, &photo, what, &times, out, err);
     image_free(&photo);
+    const unsigned char *marks = photos_valid(&s->run->photos, (size_t)what->view);
+    for (size_t i = 0; status == GBT_OK && what->format == REQUEST_RAW && marks != NULL && i < out->count / 4;
+         i++)
+        out->bytes[4 * i + 3] = marks[i] ? 255 : 0;
     return status;
 }

@@ -53,7 +53,7 @@ static gbt_status take_choice(const words *w, const char *name, const char *choi
     return GBT_OK;
 }
 
-static gbt_status check_size(int width, int height, gbt_error *err)
+gbt_status request_check_size(int width, int height, gbt_error *err)
 {
     if (width > REQUEST_SIDE_MAX || height > REQUEST_SIDE_MAX || (double)width * height > REQUEST_PIXELS_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT,
@@ -74,7 +74,7 @@ static gbt_status take_camera(const words *w, request *out)
     if ((out->width > 0) != (out->height > 0))
         return base_fail(w->err, GBT_ERR_ARGUMENT, "wanted width and height, or neither");
     if (text == NULL)
-        return check_size(out->width, out->height, w->err);
+        return request_check_size(out->width, out->height, w->err);
     if (out->width > 0)
         return base_fail(w->err, GBT_ERR_ARGUMENT, "width: the camera says its own");
     ray_shot shot;
@@ -83,7 +83,7 @@ static gbt_status take_camera(const words *w, request *out)
         return base_fail(w->err, GBT_ERR_ARGUMENT,
                          "camera: an open aperture or a rolling shutter is for gbtrace render");
     out->camera = shot.camera;
-    return check_size(shot.camera.width, shot.camera.height, w->err);
+    return request_check_size(shot.camera.width, shot.camera.height, w->err);
 }
 
 /* Six hexadecimal digits. */

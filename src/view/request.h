@@ -43,6 +43,9 @@ typedef struct request {
 /** The word behind a name in the query; NULL: not there. */
 typedef const char *request_word(void *query, const char *name);
 
+/** GBT_ERR_ARGUMENT for a picture of more pixels or longer sides than the two above. */
+gbt_status request_check_size(int width, int height, gbt_error *err);
+
 /**
  * @param path [in] "/scene", "/render", "/pick", "/photo"
  * @return GBT_OK, GBT_ERR_IO (no such path), GBT_ERR_ARGUMENT or GBT_ERR_FORMAT ("NAME: what was wrong")

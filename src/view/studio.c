@@ -33,8 +33,12 @@ static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_s
     if (s->data != NULL)
         return base_fail(err, status, "%s", first.text);
     GBT_TRY(loaded_run_open_model(s->input, run, err));
+    char *hint = strstr(first.text, "; `data`"); /* as the library calls it */
+    if (hint != NULL)
+        *hint = '\0';
     if (run->cloud.count == 0)
-        snprintf(note, note_size, "No photos: %s", first.text);
+        snprintf(note, note_size, "No photos: %.500s%s", first.text,
+                 hint != NULL ? "; gbtrace view --data says where it is now" : "");
     return GBT_OK;
 }
 
@@ -166,7 +170,7 @@ gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, 
     *out = photos_camera(&r->photos, (size_t)what->view, 0);
     if (what->width > 0)
         *out = gbt_camera_resized(out, what->width, what->height);
-    return GBT_OK;
+    return what->kind == REQUEST_PHOTO ? GBT_OK : request_check_size(out->width, out->height, err);
 }
 
 gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw, gbt_error *err)

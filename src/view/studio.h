@@ -57,7 +57,8 @@ void studio_answer(studio *s, const request *what, answer *out);
 
 /* ---- inside the room ---- */
 
-/** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there. */
+/** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there, and for one of more
+    pixels than a picture may have unless its photo is asked for. */
 gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err);
 
 /** Make the frame's tree that of `camera`, drawn as `what` says, and with `draw` its picture too, unless they

@@ -44,6 +44,14 @@ for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
     "$program" "$command" --help >out 2>err && awk 'length($0) > 100 || NR > 40 { print FILENAME ": line " NR; bad = 1 } END { exit bad }' out >>err
     report $? "help of $command fits a screen: 40 lines of 100 columns" "$(cat err)"
 done
+for command in $("$program" --help | sed -n 's/^  \([a-z-]*\) .*/\1/p'); do
+    for option in $("$program" "$command" --help-all | awk '/^  -., --/ || /^      --/ { match($0, /--[a-z-]+/); name = substr($0, RSTART, RLENGTH); text = "" }
+        { text = text " " $0 } name != "" && text ~ / 0: / { print name; name = "" }'); do
+        "$program" "$command" "$option" 0 '' >out 2>err
+        [ $? = 2 ] && grep -q '^error: argument 1 is empty' err
+        report $? "$command $option: what the help says of 0 is taken" "$(cat err)"
+    done
+done
 prints "rare options are in the whole help" '^      --final-prune-factor F .*' train --help-all
 "$program" train --help | grep -q -e '--final-prune-factor' -e '--pace' -e '--distance'
 [ $? = 1 ]
@@ -178,6 +186,8 @@ misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render noth
 misuse 2 "--downscale: not with a camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
 misuse 2 "--insert: meshes are traced (wanted the renderer trace)" render nothing -o o --insert i.json --renderer reference
 mkdir empty
+misuse 4 "empty/model.gbt: not there (wanted a run, a model file or plain Gaussians)" render empty && [ -z "$(ls empty)" ]
+report $? "and nothing is made in it" "$(ls empty)"
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
 misuse 3 "short.gbt: too short for a gbtrace file (wanted at least 64 bytes, got 8)" info short.gbt
@@ -316,6 +326,7 @@ misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
 printf '{"model": "equirectangular", "width": 16384, "height": 16384, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
 misuse 2 "large: a picture of 16384 x 16384 pixels (wanted at most 178956970 pixels)" render tiny -o o --camera large.json
 misuse 2 "film.MOV: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
+misuse 2 "picture.PNG: wanted a folder (the picture is named after its camera or view)" render tiny -o picture.PNG --camera c.json
 misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
 misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
 for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--path orbit" "--preset fast" "--renderer raster"; do
@@ -384,6 +395,7 @@ done
 grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
+prints "options of 0 leave it to the preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0 --alpha-max 0 --t-min 0
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9
 misuse 2 '--kernel: "tile,tile" (wanted list, packet, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
@@ -620,7 +632,8 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "--quality: bad value (wanted a number from 20 to 90, got 10)" compress run -o small.gbt --quality 10
     misuse 2 "small.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json small.gbt
     misuse 2 "run/model.gbt: would be overwritten (--json must be another file)" compress run -o small.gbt --json run/model.gbt
-    misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o pictures --outputs hits,dept
+    misuse 2 '--outputs: "dept" (wanted transmittance, depth, median-depth, normal, hits or anchor, with commas between)' render run -o unmade --outputs hits,dept && [ ! -e unmade ]
+    report $? "and nothing is made"
 else
     report 1 "a run to render" "$(cat err)"
 fi

@@ -37,8 +37,12 @@ report $? "a failure" "$(cat err)"
 "$program" eval --progress json --prest fast 2>err
 [ $? = 2 ] && [ "$(cat err)" = "error: --prest: unknown option (did you mean --preset?)" ]
 report $? "a command line that was not understood is told in plain words" "$(cat err)"
-"$program" train made -o paced --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --progress json 2>err && as_json err 'any(x.get("stage") == "train" and x["done"] == x["total"] == 21 for x in e)'
+"$program" train made -o paced --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --eval-split every=9 --progress json 2>err && as_json err 'any(x.get("stage") == "train" and x["done"] == x["total"] == 21 for x in e)'
 report $? "the total of a run with a pace" "$(cat err)"
+as_json err '[x["total"] for x in e if x.get("stage") == "score" and x["done"] == 1 and x["seconds"] > 1e-4] == [1]' && "$program" render paced --progress json >out 2>err &&
+    as_json err '[x["total"] for x in e if x.get("stage") == "render" and x["done"] == 1 and x["seconds"] > 1e-4] == [1]' && "$program" export paced paced.ply --refine 1 --progress json >out 2>err &&
+    as_json err '[x["total"] for x in e if x.get("stage") == "refine" and x["done"] == 1 and x["seconds"] > 1e-4] == [1]'
+report $? "the time of a stage is that of its first view or step, too" "$(cat err)"
 "$program" train made -o none --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --iterations 20 2>err
 [ $? = 2 ] && [ "$(cat err)" = "error: --iterations: 20 (wanted the 21 of --pace in all, or only one of the two)" ]
 report $? "a pace and another number of iterations" "$(cat err)"
@@ -181,8 +185,10 @@ printf "Namespace(source_path='made', resolution=16)" >widths/cfg_args
 "$program" import widths -o at_width >out 2>err && [ ! -s err ] && "$program" info at_width | grep -q '^  config    downscale = 2$'
 report $? "a width in cfg_args divides the photos of the data set" "$(cat err out; "$program" info at_width)"
 printf "Namespace(source_path='gone', resolution=16)" >widths/cfg_args
-"$program" import widths -o at_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
+"$program" import widths -o unknown_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
 report $? "without the data set it is told" "$(cat err out)"
+cp at_width/model.gbt before.gbt && ! "$program" import widths -o at_width >out 2>err && [ "$(cat err)" = "error: at_width: holds a trained run (wanted another folder)" ] && cmp before.gbt at_width/model.gbt >>out
+report $? "a run that was imported before stays" "$(cat err out)"
 
 # ---- the doctor
 "$program" doctor >out 2>err

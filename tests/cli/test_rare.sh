@@ -70,9 +70,20 @@ report $? "a list of held-out photos stays with the run" "$(cat err out; cat lis
 report $? "scores of other data leave the run's alone, from any folder" "$(cat err out)"
 holds "scores at more than the photos' size" 2 '^error: --downscale: 0.5 (wanted 1 to 64)$' eval run --downscale 0.5
 
+"$program" train made -o exposed --exposure --iterations 3 --quiet >out 2>err && cp -r exposed/renders/test scored &&
+    holds "the scored pictures of a run with exposures are not drawn over" 2 '^error: exposed/renders/test: holds the scored pictures, through the photos. colour matrices (wanted another folder)$' render exposed &&
+    diff -r scored exposed/renders/test >out && "$program" render exposed -o exposed-drawn >>out 2>err && "$program" render exposed --split train >>out 2>>err
+report $? "they stay, and all else is drawn" "$(cat err out)"
+"$program" export exposed exposed.ply exposed-result/ --refine 0 --json exposed.json >out 2>err && grep -q '"psnr_to_model"' exposed.json && ! grep -q to_photos exposed.json &&
+    grep -q '^warning: exposed-result/: ' err && "$program" export run usual.ply usual-result/ --refine 0 --json usual.json >>out 2>err && ! grep -q matrices err && grep -q '"model_psnr_to_photos"' usual.json
+report $? "an export tells scores to photos where these have no exposures" "$(cat err out exposed.json usual.json)"
+
 mkdir -p mine/scene && holds "the demo leaves data that are no scene of its own alone" 2 '^error: mine/scene: is there, and is no scene of ' demo -o mine && [ -z "$(ls mine/scene)" ]
 report $? "nor anything in their folder"
-mkdir shop && cp -r listed shop/run && holds "the demo leaves a run of other data alone" 2 '^error: shop/run: holds a run already ' demo -o shop --minutes 0.05 && cmp listed/model.gbt shop/run/model.gbt >out
+mkdir -p shop/scene && : >shop/scene/sparse && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
+[ $? = 4 ] && rm shop/scene/sparse
+report $? "a scene that was not finished" "$(cat out)"
+cp -r listed shop/run && holds "the demo takes it for its own, and leaves a run of other data alone" 2 '^error: shop/run: holds a run already ' demo -o shop --minutes 0.05 && cmp listed/model.gbt shop/run/model.gbt >out
 report $? "and its model" "$(cat out)"
 sed -i '3s|.*|../scene|' shop/run/data_places && holds "the demo trains its own run anew" 0 '^Report: shop/run/report.html$' demo -o shop --minutes 0.05 && ! cmp -s listed/model.gbt shop/run/model.gbt
 report $? "and writes its model" "$(cat err)"

@@ -444,6 +444,25 @@ static void turning_on_the_spot(void **state)
     camera_path_free(&path);
 }
 
+/** Two fields of view from one place, and back. */
+static void zooming_on_the_spot(void **state)
+{
+    (void)state;
+    const double target[3] = {0, 0, 1};
+    gbt_camera keys[3] = {looking(0, 0, 0, target), looking(0, 0, 0, target), looking(0, 0, 0, target)};
+    keys[1].params[0] = keys[1].params[1] = 120;
+    camera_path path;
+    assert_ok(camera_path_through(keys, 3, 5, 9, &path, &assert_ok_err_));
+    for (int i = 0; i < 9; i++) {
+        const gbt_camera *c = &path.shots[i].camera;
+        assert_near(c->params[0], i < 4 ? 60 + 15 * i : 180 - 15 * i, 1e-6);
+        assert_near(c->params[1], c->params[0], 0);
+        assert_near(distance_between(c, &keys[0]), 0, 1e-12);
+        assert_near(angle_between(c, &keys[0]), 0, 1e-6);
+    }
+    camera_path_free(&path);
+}
+
 static void order_to_go_through(void **state)
 {
     (void)state;
@@ -498,6 +517,12 @@ static void our_file(void **state)
     for (int i = 0; i < 5; i++)
         assert_near(p.shots[i].camera.center[0], i, 1e-6);
     assert_near(p.shots[2].camera.params[0], (32 + 32 / tan(PI / 6)) / 2, 1e-6);
+    camera_path_free(&p);
+    p = read_good("{" COMMON ", \"origin\": [0, 0, 0], \"target\": [0, 0, 5], \"cameras\": [{}, "
+                  "{\"fov_x_deg\": 60}]}",
+                  none, 3); /* at one place */
+    for (int i = 0; i < 3; i++)
+        assert_near(p.shots[i].camera.params[0], (32 * (2 - i) + 32 / tan(PI / 6) * i) / 2, 1e-6);
     camera_path_free(&p);
     p = read_good("{\"frames\": 5, " COMMON ", \"cameras\": " TWO "}", none, 3); /* the caller wins */
     assert_int_equal(p.count, 3);
@@ -771,6 +796,7 @@ int main(void)
         cmocka_unit_test(through_all_keys),
         cmocka_unit_test(through_keys_far_away),
         cmocka_unit_test(turning_on_the_spot),
+        cmocka_unit_test(zooming_on_the_spot),
         cmocka_unit_test(order_to_go_through),
         cmocka_unit_test(our_file),
         cmocka_unit_test(nerfstudio_file),

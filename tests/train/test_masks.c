@@ -272,6 +272,12 @@ static void assert_reports_leave_out_the_black(const char *folder)
     }
 }
 
+static void keep_message(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_MESSAGE)
+        snprintf(context, 256, "%s", event->text);
+}
+
 /* A photo that is masked whole is no score, and no step that fails. */
 static void a_black_mask_leaves_nothing(void **state)
 {
@@ -314,6 +320,15 @@ static void a_black_mask_leaves_nothing(void **state)
                     fabs(json_real_value(json_object_get(metrics, scores[k])) - sum / count) < 1e-6);
     }
     json_decref(metrics);
+    bytes mask =
+        read_bytes(in_root("black/masks/0000.png.png")); /* for the other one that is held out, too */
+    char said[256] = "";
+    assert_ok(file_write_atomic(in_root("black/masks/0008.png.png"), mask.data, mask.count, NULL));
+    mem_free(mask.data);
+    gbt_listen(keep_message, said);
+    json_decref(scores_of(in_root("black_run")));
+    be_quiet();
+    assert_string_equal(said, "no held-out view has a pixel that counts: scores are n/a");
 }
 
 /* Masks the wrong way round, say. */

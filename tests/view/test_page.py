@@ -115,6 +115,10 @@ def picking(page):
 def comparing(page):
     choose(page, "compare", "difference")
     page.wait(f"{STILL} && gbtrace.look.psnr > 10 && gbtrace.look.psnr < 60")
+    page.run("gbtrace.look.marks.fill(0); gbtrace.changed()")
+    page.wait(f"{STILL} && gbtrace.look.psnr === null")
+    page.run("gbtrace.look.marks.fill(255); gbtrace.changed()")
+    page.wait(f"{STILL} && gbtrace.look.psnr > 10 && gbtrace.look.psnr < 60")
     choose(page, "compare", "slider")
     page.wait(STILL)
     page.drag(middle(page, "#handle"), (40, 0))

@@ -43,11 +43,12 @@ static void *view(void *context)
     return NULL;
 }
 
-static int open_viewer(viewer *v, const char *input)
+static int open_viewer_beside(viewer *v, const char *input, const char *data)
 {
     int port = 0;
     *v = (viewer){.input = input, .def = gbt_view_def_default()};
     v->def.port = 0;
+    v->def.data = data;
     v->def.ready = tell;
     v->def.context = v;
     assert_int_equal(pipe(v->ready), 0);
@@ -59,6 +60,8 @@ static int open_viewer(viewer *v, const char *input)
     }
     return port;
 }
+
+static int open_viewer(viewer *v, const char *input) { return open_viewer_beside(v, input, NULL); }
 
 /* As Ctrl-C does. */
 static void close_viewer(viewer *v, int number)
@@ -402,6 +405,52 @@ static void points_lie_behind_their_pixels(void **state)
     close_viewer(&v, SIGINT);
 }
 
+static void copy_file(const char *from, const char *to)
+{
+    bytes b = read_bytes(from);
+    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
+    mem_free(b.data);
+}
+
+/* Photos of another data set: masked pixels are transparent, and a camera of too many pixels is drawn smaller
+   or not at all. */
+static void masked_and_large_photos(void **state)
+{
+    (void)state;
+#define POSE "\"transform_matrix\": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]"
+    static const char text[] =
+        "{\"fl_x\": 40, \"frames\": [{\"file_path\": \"0.png\", \"mask_path\": \"mask.png\", "
+        "\"w\": 48, \"h\": 36, " POSE "}, {\"file_path\": \"1.png\", \"w\": 1200, \"h\": 8000, " POSE "}]}";
+    image mask;
+    assert_ok(image_alloc(&mask, 48, 36, 1, NULL));
+    for (int i = 0; i < 48 * 36; i++)
+        mask.pixels[i] = i % 48 >= 16;
+    assert_ok(file_make_folder(in_root("beside"), NULL));
+    assert_ok(image_write(in_root("beside/mask.png"), &mask, NULL));
+    image_free(&mask);
+    for (int i = 0; i < 2; i++)
+        copy_file(in_root("tiny/images/0000.png"), in_root("beside/%d.png", i));
+    assert_ok(file_write_atomic(in_root("beside/transforms.json"), text, sizeof text - 1, NULL));
+    viewer v;
+    const int port = open_viewer_beside(&v, run_folder, in_root("beside"));
+    reply r = get_ok(port, "/photo?view=0");
+    assert_int_equal(r.body_count, 4 * 48 * 36);
+    for (int i = 0; i < 48 * 36; i++)
+        assert_int_equal((unsigned char)r.body[4 * i + 3], i % 48 >= 16 ? 255 : 0);
+    free(r.text);
+    static const char *const too_large[] = {"/render?view=1", "/pick?view=1&x=1&y=1"};
+    for (int i = 0; i < 2; i++) {
+        r = http_get(port, too_large[i]);
+        if (r.code != 400 || strstr(r.body, "picture of 1200 x 8000 pixels") == NULL)
+            fail_msg("%s: %.300s", too_large[i], r.text);
+        free(r.text);
+    }
+    r = get_ok(port, "/render?view=1&width=12&height=80");
+    assert_int_equal(r.body_count, 4 * 12 * 80);
+    free(r.text);
+    close_viewer(&v, SIGINT);
+}
+
 /* ---- while it trains ---- */
 
 static void wait_for_version(int port, int version)
@@ -584,7 +633,9 @@ static void a_model_without_its_photos(void **state)
     json_t *there = get_json(port, "/scene"), *status = get_json(port, "/status");
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
     assert_true(number_of(there, "size") > 0);
-    assert_non_null(strstr(json_string_value(json_object_get(status, "note")), "No photos: "));
+    const char *note = json_string_value(json_object_get(status, "note"));
+    assert_true(strncmp(note, "No photos: ", 11) == 0 && strstr(note, "`data`") == NULL);
+    assert_non_null(strstr(note, "); gbtrace view --data says where it is now"));
     json_decref(there);
     json_decref(status);
     close_viewer(&v, SIGINT);
@@ -601,6 +652,7 @@ int main(void)
         cmocka_unit_test(a_background_is_chosen),
         cmocka_unit_test(every_format_and_output),
         cmocka_unit_test(points_lie_behind_their_pixels),
+        cmocka_unit_test(masked_and_large_photos),
         cmocka_unit_test(newer_models_are_shown),
         cmocka_unit_test(a_result_folder_is_shown),
         cmocka_unit_test(plain_gaussians_are_shown),

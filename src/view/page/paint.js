@@ -58,17 +58,27 @@ export function paintOutput(output, values, pixels, range) {
     return range;
 }
 
-// |a - b| four times as bright, and the PSNR of the two, 8 bit, without alpha.
-export function difference(a, b, out) {
-    let sum = 0;
+// Which pixels of a photo count, from its alpha, which is opaque then.
+export function takeMarks(pixels) {
+    const marks = new Uint8Array(pixels.length / 4);
+    for (let i = 0; i < marks.length; i++)
+        marks[i] = pixels[4 * i + 3], pixels[4 * i + 3] = 255;
+    return marks;
+}
+
+// |a - b| four times as bright, and the PSNR of the two, 8 bit, without alpha, of the pixels that count (marks; null: all). null: none does.
+export function difference(a, b, marks, out) {
+    let sum = 0, count = 0;
     for (let i = 0; i < a.length; i += 4) {
+        const counts = marks === null || marks[i / 4] > 0;
         for (let k = 0; k < 3; k++) {
-            const d = Math.abs(a[i + k] - b[i + k]);
+            const d = counts ? Math.abs(a[i + k] - b[i + k]) : 0;
             sum += d * d;
             out[i + k] = 4 * d;
         }
         out[i + 3] = 255;
+        count += counts;
     }
-    const mse = sum / (a.length / 4 * 3) / (255 * 255);
-    return mse > 0 ? Math.min(100, -10 * Math.log10(mse)) : 100;
+    const mse = sum / (3 * count) / (255 * 255);
+    return count === 0 ? null : mse > 0 ? Math.min(100, -10 * Math.log10(mse)) : 100;
 }

@@ -2,7 +2,7 @@
 // view.js -- the page put together: controls to camera, camera to pictures, pictures to canvases.
 import { Camera, sub } from "./camera.js";
 import { Lines, roundBelow } from "./lines.js";
-import { difference, paintOutput, ramp, rangeOf } from "./paint.js";
+import { difference, paintOutput, ramp, rangeOf, takeMarks } from "./paint.js";
 import { Pictures } from "./pictures.js";
 import { Training } from "./training.js";
 import { findSubject } from "./subject.js";
@@ -16,7 +16,7 @@ if (words.has("token")) // the server has made a cookie of it
     history.replaceState(null, "", location.pathname);
 const camera = new Camera();
 const look = {
-    scene: null, subject: null, view: -1, photo: null, noPhoto: "", split: 0.5, // what there is, and beside what; why there is no photo
+    scene: null, subject: null, view: -1, photo: null, marks: null, noPhoto: "", split: 0.5, // what there is, and beside what; why there is no photo
     done: null, about: null, first: null, sum: null, values: null, range: null, psnr: null, pointed: undefined, // what is shown
 };
 
@@ -158,7 +158,8 @@ async function show(picture, done) {
     look.psnr = null;
     if (compareMode() === "difference" && look.values === null) {
         seen = new Uint8ClampedArray(pixels.length);
-        look.psnr = difference(pixels, photoPixels(about.width, about.height), seen);
+        const marks = look.photo.width === about.width && look.photo.height === about.height ? look.marks : null;
+        look.psnr = difference(pixels, photoPixels(about.width, about.height), marks, seen);
     }
     canvas.getContext("2d").putImageData(new ImageData(seen, about.width, about.height), 0, 0);
     look.about = about, look.done = done;
@@ -246,6 +247,7 @@ async function fetchPhoto(view) {
     const canvas = byId("photo"), mode = compareMode();
     look.photo = photo !== null ? canvas : null, look.noPhoto = why;
     if (photo !== null) {
+        look.marks = takeMarks(photo.data);
         canvas.width = photo.width, canvas.height = photo.height;
         canvas.getContext("2d").putImageData(photo, 0, 0);
     }

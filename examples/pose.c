@@ -79,8 +79,9 @@ static gbt_status run(gbt_model *model, gbt_error *err)
            angle_between(&camera, &view.camera));
     if (status == GBT_OK)
         status = find_pose(model, target, rgb, d_rgb, &camera, err);
-    printf("after:  %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera),
-           angle_between(&camera, &view.camera));
+    if (status == GBT_OK)
+        printf("after:  %.4f units and %.3f degrees away\n", distance_between(&camera, &view.camera),
+               angle_between(&camera, &view.camera));
     free(target);
     free(rgb);
     free(d_rgb);
@@ -99,7 +100,7 @@ int main(int argc, char **argv)
     if (status == GBT_OK)
         status = run(model, &err);
     if (status != GBT_OK)
-        fprintf(stderr, "error: %s\n", err.text);
+        fprintf(stderr, "error: %s\n", err.text[0] != '\0' ? err.text : "out of memory");
     gbt_model_close(model);
     return gbt_status_exit_code(status);
 }

@@ -46,15 +46,15 @@ int main(int argc, char **argv)
             status = gbt_model_render(model, &view.camera, false, &picture, &err);
         if (status == GBT_OK && !write_ppm(argv[2], rgb, view.camera.width, view.camera.height)) {
             status = GBT_ERR_IO;
-            perror(argv[2]);
+            snprintf(err.text, sizeof err.text, "%.400s: cannot be written", argv[2]);
         }
         if (status == GBT_OK)
             printf("%s: %d x %d pixels of view %s, one of %zu\n", argv[2], view.camera.width,
                    view.camera.height, view.name, count);
         free(rgb);
     }
-    if (err.text[0] != '\0')
-        fprintf(stderr, "error: %s\n", err.text);
+    if (status != GBT_OK)
+        fprintf(stderr, "error: %s\n", err.text[0] != '\0' ? err.text : "out of memory");
     gbt_model_close(model);
     return gbt_status_exit_code(status);
 }

@@ -10,12 +10,13 @@
 int main(int argc, char **argv)
 {
     gbt_error err = {0};
-    if (argc < 3) {
+    gbt_train_def train = gbt_train_def_default();
+    char *end = "";
+    train.iterations = argc > 3 ? strtoul(argv[3], &end, 10) : 2000;
+    if (argc < 3 || *end != '\0' || (argc > 3 && end == argv[3])) {
         fprintf(stderr, "usage: train DATA RUN [ITERATIONS]\n");
         return 2;
     }
-    gbt_train_def train = gbt_train_def_default();
-    train.iterations = argc > 3 ? strtoul(argv[3], NULL, 10) : 2000;
     gbt_status status = gbt_train(argv[1], argv[2], &train, &err);
     if (status == GBT_OK) {
         const gbt_evaluate_def evaluate = gbt_evaluate_def_default();

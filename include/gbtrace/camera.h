@@ -50,7 +50,7 @@ typedef struct gbt_camera {
     gbt_camera_model model;
     int width, height;                    /* pixels, > 0 */
     double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order; lengths in pixels */
-    double rotation[9];                   /* world to camera, row-major, orthonormal, det +1 */
+    double rotation[9];                   /* world to camera, row-major, orthonormal within 1e-3, det +1 */
     double center[3];                     /* camera centre, world (scene-local) units */
     gbt_camera_shutter shutter; /* with a rolling one, the pose is that of the image's middle, and */
     double motion[6]; /* the camera's while the image is read out, edge to edge, downwards or to the right,

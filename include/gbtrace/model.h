@@ -109,7 +109,7 @@ typedef struct gbt_model_settings {
                         as trained; 0.1 for plain Gaussians */
     float t_near;    /* nearest distance at which anything is seen, >= 0. Default as trained; of plain
                         Gaussians 0.01, or what the file says */
-    float alpha_min; /* smallest response that counts, (0, 1). Default 1/255 */
+    float alpha_min; /* smallest response that counts, [1e-30, 1). Default 1/255 */
     float alpha_max; /* responses are cut here, [alpha_min, 1). Default 0.99 */
     float transmittance_min; /* a ray ends before less than this is left, (0, 1). Default 1e-4 */
 } gbt_model_settings;

@@ -78,7 +78,7 @@ gbt_balls_view gbt_balls_get(const gbt_balls *balls);
 /**
  * The k nearest centres of each point, nearest first.
  *
- * @param point    [in]  [count][3]
+ * @param point    [in]  [count][3], within +-1e100
  * @param k        [in]  >= 1
  * @param skip_same [in] ball i is no answer to query i: the points are the balls' own centres
  * @param index    [out] [count][k]; UINT32_MAX where there are fewer than k
@@ -102,8 +102,9 @@ typedef struct gbt_answers {
 
 void gbt_answers_free(gbt_answers *answers);
 
-/* What the next four have in common: count queries; GBT_OK, GBT_ERR_ARGUMENT (names the first bad query),
-   GBT_ERR_NO_MEMORY. Cost: about O(log n + m) each, of m answers. */
+/* What the next four have in common: count queries, points and origins within +-1e100; GBT_OK,
+   GBT_ERR_ARGUMENT (names the first bad query), GBT_ERR_NO_MEMORY. Cost: about O(log n + m) each, of m
+   answers. */
 
 /** Centres within radius[i] (>= 0, may be infinite) of point[i]. */
 gbt_status gbt_balls_within(const gbt_balls *balls, const double *point, const double *radius, size_t count,
@@ -120,7 +121,7 @@ gbt_status gbt_balls_overlapping(const gbt_balls *balls, const double *point, co
 /**
  * Balls that meet the segment origin[i] + t direction[i], t_min[i] <= t <= t_max[i].
  *
- * @param direction [in] [count][3], of any length but 0
+ * @param direction [in] [count][3], within +-1e100, one component at least 1e-100 or at most -1e-100
  * @param t_min, t_max [in] [count], may be negative or infinite; NULL: 0, infinity
  */
 gbt_status gbt_balls_crossed(const gbt_balls *balls, const double *origin, const double *direction,

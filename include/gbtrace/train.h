@@ -183,8 +183,8 @@ size_t gbt_train_setting_count(void);
 /** One of them, static; `index` is below the count. */
 const gbt_train_setting *gbt_train_setting_at(size_t index);
 
-/** Threads for everything that follows, >= 1. Without this call: the processors of this process, at most its
-    control group's quota. */
+/** Threads for everything that follows, 1 to 1024; others are brought into that range. Without this call: the
+   processors of this process, at most its control group's quota. */
 void gbt_set_threads(int threads);
 
 /**

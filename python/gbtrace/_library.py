@@ -212,13 +212,13 @@ def version():
     return library.gbt_version().decode()
 
 
-def whole_number(value, name, least):
+def whole_number(value, name, least, most=2**31 - 1):
     """As C's int, which ctypes would take modulo 2^32."""
-    if not least <= index(value) < 2**31:
-        raise ValueError(f"{name}: {value} (wanted {least} to {2**31 - 1})")
+    if not least <= index(value) <= most:
+        raise ValueError(f"{name}: {value} (wanted {least} to {most})")
     return index(value)
 
 
 def set_threads(threads):
-    """Threads for everything that follows, at least 1; without this, all processors of this process."""
-    library.gbt_set_threads(whole_number(threads, "threads", 1))
+    """Threads for everything that follows, 1 to 1024; without this, all processors of this process."""
+    library.gbt_set_threads(whole_number(threads, "threads", 1, 1024))

@@ -31,9 +31,9 @@ class Camera:
             names = library.gbt_camera_param_names(MODELS[model]).decode()
             raise ValueError(f"params: {len(params)} (wanted {count} for {model}: {names})")
         self._c = CCamera(MODELS[model], whole_number(width, "width", 0), whole_number(height, "height", 0))
-        self.params[:] = params
-        self.rotation[:] = np.eye(3) if rotation is None else rotation
-        self.center[:] = center
+        self.params = params
+        self.rotation = np.eye(3) if rotation is None else rotation
+        self.center = center
 
     @classmethod
     def pinhole(cls, width, height, fov_x_deg):
@@ -68,7 +68,7 @@ class Camera:
 
     @params.setter
     def params(self, values):
-        self.params[:] = values
+        _fill(self.params, values, "params")
 
     @property
     def rotation(self):
@@ -76,7 +76,7 @@ class Camera:
 
     @rotation.setter
     def rotation(self, values):
-        self.rotation[:] = values
+        _fill(self.rotation, values, "rotation")
 
     @property
     def center(self):
@@ -84,7 +84,7 @@ class Camera:
 
     @center.setter
     def center(self, values):
-        self.center[:] = values
+        _fill(self.center, values, "center")
 
     @property
     def shutter(self):
@@ -102,7 +102,7 @@ class Camera:
 
     @motion.setter
     def motion(self, values):
-        self.motion[:] = values
+        _fill(self.motion, values, "motion")
 
     def looking_at(self, origin, target, up=(0, -1, 0)):
         """The same lens at `origin`, with `target` in the middle of its picture and `up` towards its top."""
@@ -132,6 +132,14 @@ class Camera:
 
     def __repr__(self):
         return f"Camera({self.model!r}, {self.width}, {self.height}, params={self.params.tolist()}, center={self.center.tolist()})"
+
+
+def _fill(array, values, name):
+    """Without broadcasting: one number in place of three is a mistake."""
+    values = np.asarray(values, dtype=np.float64)
+    if values.shape != array.shape:
+        raise ValueError(f"{name}: shape {values.shape} (wanted {array.shape})")
+    array[:] = values
 
 
 def _doubles(values, count):

@@ -136,6 +136,13 @@ class Cameras(unittest.TestCase):
         self.assertEqual((camera._c.center[:], camera._c.params[:4], camera._c.rotation[2]), ([1, 2, 3], [30, 31, 20, 15], 1))
         with self.assertRaisesRegex(AttributeError, "centre"):
             camera.centre = (1, 2, 3)
+        before = bytes(camera._c)
+        for name, value in (("center", 1), ("center", [1]), ("center", [[1, 2, 3]]), ("params", [30]), ("rotation", 1), ("rotation", [1, 0, 0]), ("motion", 0)):
+            with self.assertRaisesRegex(ValueError, f"^{name}: shape .* .wanted "):
+                setattr(camera, name, value)
+        with self.assertRaisesRegex(ValueError, "^rotation: shape .3,. .wanted .3, 3.."):
+            gbtrace.Camera("PINHOLE", 40, 30, (30, 30, 20, 15), rotation=[1, 0, 0])
+        self.assertEqual(bytes(camera._c), before)
 
     def test_copies_have_their_own_memory(self):
         camera = a_camera()
@@ -195,8 +202,8 @@ class Cameras(unittest.TestCase):
             a_camera().looking_at((0, 0, np.nan), (0, 0, 0))
         with self.assertRaisesRegex(ValueError, "gaussians: 4294967296"):
             gbtrace.export("RUN", "scene.ply", gaussians=2**32)
-        for threads in (0, 2**32):
-            with self.assertRaisesRegex(ValueError, f"threads: {threads} .wanted 1 to"):
+        for threads in (0, 1025, 2**32):
+            with self.assertRaisesRegex(ValueError, f"threads: {threads} .wanted 1 to 1024"):
                 gbtrace.set_threads(threads)
 
 

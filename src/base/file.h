@@ -39,7 +39,8 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.
  *
  * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
- * we see. A device, a pipe or /dev/stdout is written to as it is.
+ * we see. A device, a pipe or /dev/stdout is written to as it is. Who may read and write the file stays as it
+ * was; of a link the file that it leads to is replaced.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
@@ -82,6 +83,11 @@ typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
 /** Devices, pipes and names of open files (/dev/stdout): they are written to as they are, for a file renamed
    to /dev/null would take its place. */
 bool file_is_stream(const char *path);
+
+enum { FILE_NAME_MOST = 4096 };
+
+/** The file that a link leads to, in `real`; `path` where it is no link, or leads to nothing. */
+const char *file_behind(const char *path, char real[FILE_NAME_MOST]);
 
 /** What is at a path; errors as of file_stat(). */
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err);

@@ -41,8 +41,11 @@ gbt_status large_file_open(const char *path, large_file *out, gbt_error *err)
 
 gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
 {
-    GBT_TRY(set_name(out, path, err));
+    char real[FILE_NAME_MOST];
+    struct stat old;
     const bool stream = file_is_stream(path);
+    path = stream ? path : file_behind(path, real);
+    GBT_TRY(set_name(out, path, err));
     const char *slash = strrchr(path, '/');
     const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;
     if (!stream && snprintf(out->temporary, sizeof out->temporary, "%.*s.%s.tmp", folder_length, path,
@@ -52,6 +55,8 @@ gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
                           : open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
+    if (!stream && stat(path, &old) == 0) /* a private file stays one; the next write can open this one */
+        fchmod(fd, (old.st_mode & 0777) | S_IWUSR);
     out->open = true;
     out->descriptor = fd;
     return GBT_OK;

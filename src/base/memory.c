@@ -29,11 +29,10 @@ static int must_fail(void)
 
 void mem_fail_after(long n) { atomic_store(&fail_countdown, n < 0 ? -1 : n); }
 
-/* As mem_alloc(). A fresh file is zero. */
+/* As mem_alloc(). A fresh file is zero; `zero` NULL: never from a file. */
 static void *take(size_t count, size_t size, const char *what, bool *zero, gbt_error *err)
 {
     size_t bytes;
-    *zero = false;
     if (__builtin_mul_overflow(count, size, &bytes) || bytes > PTRDIFF_MAX - LARGE_PAGE) {
         base_fail(err, GBT_ERR_NO_MEMORY, "%s: %zu elements of %zu bytes are more than memory can hold", what,
                   count, size);
@@ -44,9 +43,10 @@ static void *take(size_t count, size_t size, const char *what, bool *zero, gbt_e
         bytes = MEM_ALIGN;
     void *pointer = NULL;
     const bool fails = must_fail();
-    if (!fails && paged_map(bytes, what, &pointer, err) != GBT_OK)
+    if (!fails && zero != NULL && paged_map(bytes, what, &pointer, err) != GBT_OK)
         return NULL;
-    *zero = pointer != NULL;
+    if (zero != NULL)
+        *zero = pointer != NULL;
     if (pointer != NULL)
         return pointer;
     /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as
@@ -75,6 +75,13 @@ void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err)
     if (pointer != NULL && !zero)
         memset(pointer, 0, count * size);
     return pointer;
+}
+
+gbt_status mem_check(size_t count, size_t size, const char *what, gbt_error *err)
+{
+    void *volatile room = take(count, size, what, NULL, err); /* or the compiler would leave both out */
+    free(room);
+    return room != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
 void mem_copy(void *to, const void *from, size_t bytes)

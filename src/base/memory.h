@@ -22,6 +22,10 @@ void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err);
 /** The same, filled with zeros. */
 void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err);
 
+/** Whether other libraries could allocate `count * size` bytes now. Makes no file. @return GBT_OK or
+    GBT_ERR_NO_MEMORY, with a message as that of mem_alloc() */
+gbt_status mem_check(size_t count, size_t size, const char *what, gbt_error *err);
+
 /**
  * Make `*array` hold at least `count` elements, keeping the first `used`.
  *

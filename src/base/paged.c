@@ -53,13 +53,15 @@ void paged_stop(void) { atomic_store(&resident_limit, 0); }
 static gbt_status map_file(size_t bytes, const char *what, void **out, gbt_error *err)
 {
     int file;
-    GBT_TRY(unnamed_file_open(place, &file, err));
+    gbt_error why = {0};
+    if (unnamed_file_open(place, &file, &why) != GBT_OK)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s", why.text);
     /* Room on the disk now, or a write to the array would end the process later. */
     const int failed = posix_fallocate(file, 0, (off_t)bytes);
     void *start = failed == 0 ? mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0) : MAP_FAILED;
     close(file); /* the mapping keeps it */
     if (failed != 0)
-        return base_fail(err, GBT_ERR_IO, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
                          strerror(failed));
     if (start == MAP_FAILED)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);

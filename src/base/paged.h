@@ -34,8 +34,8 @@ void paged_stop(void);
 void paged_check(void);
 
 /** For mem_alloc(): `bytes` of zeros, mapped from a file. `*out` stays NULL before paged_start(), and where
-   there are fewer than PAGED_LEAST_BYTES, or more than 32,000 arrays. @return GBT_OK, GBT_ERR_IO (the disk
-   is full), GBT_ERR_NO_MEMORY
+   there are fewer than PAGED_LEAST_BYTES, or more than 32,000 arrays. @return GBT_OK or
+   GBT_ERR_NO_MEMORY (a full disk, too)
  */
 gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err);
 

@@ -41,7 +41,9 @@ parallel_account parallel_account_now(void);
 /** What parallel_blocks() runs blocks by, without the account. */
 void parallel_run(size_t count, size_t grain, parallel_body *body, void *context);
 
-void parallel_set_threads(int threads); /* >= 1; process-wide */
+enum { PARALLEL_THREADS_MAX = 1024 };
+
+void parallel_set_threads(int threads); /* brought into 1 to PARALLEL_THREADS_MAX; process-wide */
 int parallel_threads(void);             /* the number set, else machine_threads() of this machine */
 
 /** Name and version of the library behind these, as it runs: "oneTBB 2021.8". Static. */

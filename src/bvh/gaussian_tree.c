@@ -149,7 +149,7 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius
         return GBT_OK;
     void *device = bvh_device(err);
     if (device == NULL)
-        return GBT_ERR_INTERNAL;
+        return bvh_check("bvh", err);
     if (tree->internal == NULL) {
         tree->internal = mem_calloc(1, sizeof(builder), "bvh builder", err);
         if (tree->internal == NULL)

@@ -73,10 +73,9 @@ static gbt_status check_points(builder *b, gbt_error *err)
     for (size_t j = 0; j < 3; j++)
         if (!(fabs(number_at(b->position, 3 * i + j)) <= POINT_LIMIT))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "points: point %zu: bad coordinate (wanted a finite number, got %g)", i,
+                             "points: point %zu: bad coordinate (wanted -1e100 to 1e100, got %g)", i,
                              number_at(b->position, 3 * i + j));
-    return base_fail(err, GBT_ERR_ARGUMENT,
-                     "points: point %zu: bad radius (wanted a finite number >= 0, got %g)", i,
+    return base_fail(err, GBT_ERR_ARGUMENT, "points: point %zu: bad radius (wanted 0 to 1e100, got %g)", i,
                      number_at(b->radius, i));
 }
 

@@ -18,7 +18,7 @@
 
 #include "bvh/points.h"
 
-enum { POINT_WIDTH = 8, POINT_DEPTH_MAX = 96, POINT_STACK = POINT_DEPTH_MAX * (POINT_WIDTH - 1) + 1 };
+enum { POINT_WIDTH = 8, POINT_DEPTH_MAX = 512, POINT_STACK = POINT_DEPTH_MAX * (POINT_WIDTH - 1) + 1 };
 
 /* Eight lines of a cache. Lanes from child_count on repeat the first. */
 typedef struct point_node {

@@ -21,8 +21,8 @@ gbt_status point_query_check(const point_query *q, gbt_error *err)
     if (q->what != POINTS_CROSSED) {
         if (!usable3(q->a))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "points: bad query (wanted finite coordinates, got %g %g %g)", q->a[0], q->a[1],
-                             q->a[2]);
+                             "points: bad query (wanted coordinates from -1e100 to 1e100, got %g %g %g)",
+                             q->a[0], q->a[1], q->a[2]);
         if (q->what != POINTS_CONTAINING && !(q->radius >= 0))
             return base_fail(err, GBT_ERR_ARGUMENT, "points: bad search radius (wanted >= 0, got %g)",
                              q->radius);
@@ -31,8 +31,9 @@ gbt_status point_query_check(const point_query *q, gbt_error *err)
     const double most = fmax(fabs(q->b[0]), fmax(fabs(q->b[1]), fabs(q->b[2])));
     if (!usable3(q->a) || !usable3(q->b) || !(most >= 1 / POINT_LIMIT) || isnan(q->t_min) || isnan(q->t_max))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "points: bad ray (wanted finite numbers and a direction, got origin %g %g %g, "
-                         "direction %g %g %g, from %g to %g)",
+                         "points: bad ray (wanted coordinates from -1e100 to 1e100, a direction with a "
+                         "component from 1e-100 to 1e100, no NaN; got origin %g %g %g, direction %g %g %g, "
+                         "from %g to %g)",
                          q->a[0], q->a[1], q->a[2], q->b[0], q->b[1], q->b[2], q->t_min, q->t_max);
     return GBT_OK;
 }

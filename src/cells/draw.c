@@ -100,19 +100,11 @@ gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *sh
     d->settings = *settings;
     memset(d->settings.background, 0, sizeof d->settings.background);
     d->variance = variance;
-    /* One kernel for all cells: the depths that two kernels find for a hit differ by rounding, and between
-       two cells it could be counted twice, or not at all. */
-    gbt_error lists = {0};
     d->scene.kernel = TRACE_LIST;
-    gbt_status status = draw_all(d, shot, out, &lists);
-    if (status == GBT_ERR_ARGUMENT && d->drawn_cells > 0 && !d->scene.listed) {
-        d->scene.kernel = TRACE_SINGLE;
-        status = draw_all(d, shot, out, err);
-    } else if (status != GBT_OK)
-        status = base_fail(err, status, "%s", lists.text);
-    if (status == GBT_OK && d->share.count <= 1)
+    GBT_TRY(draw_all(d, shot, out, err));
+    if (d->share.count <= 1)
         add_background(&(picture){d, out}, settings->background);
-    return status;
+    return GBT_OK;
 }
 
 void cell_drawer_free(cell_drawer *d)

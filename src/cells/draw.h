@@ -43,8 +43,7 @@ typedef struct cell_drawer {
     size_t first, end;  /* of the chunks, front to back: those of the share */
     size_t memory;      /* bytes that this process may take */
     size_t budget;      /* of them, for one cell */
-    size_t bytes_each, bytes_pair;
-    float variance; /* of a pixel, px^2; 0: thin rays */
+    float variance;     /* of a pixel, px^2; 0: thin rays */
     trace_settings settings;
     ray_image rays;              /* `near`, `far` and `through` are those of the cell being drawn */
     unsigned char *over, *ended; /* [rays] 1: transmittance_min ended the ray; so it did in this cell */

@@ -107,8 +107,7 @@ static bool keep_rows(cell_drawer *d, const cell_part *part, const gaussians *g)
         if (!find_extent(d, g, i, half, &radius) || !reaches_into(d, part, mean, half))
             continue;
         load->pairs += count_tiles(d, mean, radius);
-        const double bytes =
-            (double)(load->count + 1) * (double)d->bytes_each + load->pairs * (double)d->bytes_pair;
+        const double bytes = (double)(load->count + 1) * CELL_BYTES_EACH + load->pairs * CELL_BYTES_PAIR;
         if (bytes > (double)d->budget || load->count == load->capacity)
             return false;
         uint32_t number;
@@ -185,7 +184,7 @@ static gbt_status load_chunk(cell_drawer *d, const cell_chunk *c, const cell_par
 static gbt_status reserve(cell_drawer *d, gbt_error *err)
 {
     cell_load *load = &d->load;
-    const size_t capacity = d->budget / d->bytes_each;
+    const size_t capacity = d->budget / CELL_BYTES_EACH;
     if (load->raw == NULL) {
         GBT_TRY(gaussian_cloud_alloc(&load->cloud, ROWS_TOGETHER, err));
         memset(load->cloud.sh, 0, ROWS_TOGETHER * GAUSSIAN_SH_COUNT * 3 * sizeof *load->cloud.sh);
@@ -263,7 +262,7 @@ static bool is_far_too_much(const cell_drawer *d, const cell_part *part)
         const cell_chunk *c = &d->store->chunks[d->visible[i]];
         rows += c->count > 0 && chunk_reaches_into(d, c, part) ? c->count : 0;
     }
-    return (double)rows * (double)d->bytes_each > 4 * (double)d->budget;
+    return (double)rows * CELL_BYTES_EACH > 4 * (double)d->budget;
 }
 
 gbt_status cell_load_part(cell_drawer *d, const cell_part *part, bool *fits, gbt_error *err)

@@ -15,6 +15,9 @@ enum { RAY_BLOCK = 4096 };
 /* What the program itself takes, the buffers of threads and of files. */
 static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)48 << 20;
 
+/* Of one cell: lists number records, and pairs of Gaussian and tile, in 32 bits. */
+static const size_t cell_bytes_most = (size_t)64 << 30;
+
 /* Directions and what the lens makes of the pixels, intervals, colours of the cell and in all, and the
    picture as it is written; layers, where there are shares. */
 enum { PIXEL_BYTES = 120, PIXEL_LAYER_BYTES = 80 };
@@ -170,10 +173,8 @@ static gbt_status find_budget(cell_drawer *d, gbt_error *err)
     d->budget = d->memory - base_bytes - pixel * pixels;
     if (d->cell_bytes > 0 && d->cell_bytes < d->budget)
         d->budget = d->cell_bytes;
-    const bool lists = d->scene.kernel == TRACE_LIST;
-    d->bytes_each =
-        lists ? 340 : 560; /* rows as read and sorted, records; then those of the view, or a tree */
-    d->bytes_pair = lists ? 20 : 0;
+    if (d->budget > cell_bytes_most)
+        d->budget = cell_bytes_most;
     return GBT_OK;
 }
 

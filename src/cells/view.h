@@ -7,6 +7,10 @@
 
 enum { CELL_DEPTH_MOST = 16, CELL_LOAD_FLOATS = GAUSSIANS_FIELD_COUNT };
 
+/* What a Gaussian of a cell takes, rows as read and sorted, records, those of the view; and a tile that it
+   reaches into. */
+enum { CELL_BYTES_EACH = 340, CELL_BYTES_PAIR = 20 };
+
 /** A node of the store's tree: a box, and the cuts that lead to it. */
 typedef struct cell_part {
     size_t node;

@@ -90,6 +90,8 @@ typedef struct frame {
  *
  * @param keep_tape [in] true when frame_backward_gaussians(), frame_backward_plain() or frame_blend_weights()
  *                       follows
+ * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check(); with splats also what raster_takes() refuses),
+ *         GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED (the stop of f->scene or f->splats), GBT_ERR_INTERNAL
  * Threads: one frame per thread; parallel inside; same bits for every thread count.
  */
 gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camera,
@@ -119,7 +121,7 @@ typedef struct frame_tracer {
  * There is no adjoint.
  *
  * @param tracer [in] optional (NULL); with one everything is made, seen from the camera or not
- * @return GBT_OK, GBT_ERR_ARGUMENT (ray_shot_check()), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
+ * @return as frame_render(); GBT_ERR_ARGUMENT with splats also for an aperture, given rays and a tracer
  * Threads: as frame_render(). Cost: decoding and building once, rays and tracing for every sample.
  */
 gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *shot,

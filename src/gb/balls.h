@@ -66,10 +66,11 @@ void balls_free(balls *b);
 /**
  * Base spatial scale of a cloud (v), > 0 and finite for >= 2 distinct points, else 1.
  *
- * GBT_VOXEL_RULE_MEDIAN: lower median of the distance to the nearest neighbour. GBT_VOXEL_RULE_SQUARED: lower
- * median of the mean of the 3 squared neighbour distances. When the plain median is 0 (duplicates): the
- * median over the points whose value is > 0; when there are none, over the distinct points. Fewer than 4
- * points have fewer than 3 neighbours to average.
+ * GBT_VOXEL_RULE_MEDIAN: lower median of the distance to the nearest neighbour. GBT_VOXEL_RULE_SQUARED: of n
+ * means of the 3 squared neighbour distances the floor(n / 2)-th smallest, one below the lower median when n
+ * is odd, as the reference code. When the plain median is 0 (duplicates): the median over the points whose
+ * value is > 0; when there are none, over the distinct points. Fewer than 4 points have fewer than 3
+ * neighbours to average.
  * @return GBT_OK, GBT_ERR_ARGUMENT (non-finite point: says which), GBT_ERR_NO_MEMORY; *out is 1 on failure
  * Threads: same bits for every thread count. Cost: one nearest-neighbour query per point.
  */

@@ -220,7 +220,7 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
                              (double)g->background[k]);
     const value_range ranges[] = {{"footprint", &g->footprint, 1, 0, 4},
                                   {"t_near", &g->t_near, 1, 0, 1e17f},
-                                  {"alpha_min", &g->alpha_min, 1, FLT_MIN, below_one},
+                                  {"alpha_min", &g->alpha_min, 1, 1e-30f, below_one},
                                   {"alpha_max", &g->alpha_max, 1, FLT_MIN, below_one},
                                   {"transmittance_min", &g->transmittance_min, 1, FLT_MIN, below_one}};
     for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++)

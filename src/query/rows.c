@@ -27,9 +27,10 @@ static gbt_status add_row(query_rows *rows, const double *values, gbt_error *err
 
 /* ---- text ---- */
 
-/* Numbers of a line; false when one is none. */
+/* Numbers of a line; false when one is none, or missing between commas. */
 static bool read_line(const char *at, const char *end, double value[ROW_WIDTH_MAX + 1], size_t *count)
 {
+    bool missing = true; /* no number since the last comma, or the begin of the line */
     *count = 0;
     while (at < end && *at != '#') {
         const char *token = at;
@@ -40,6 +41,12 @@ static bool read_line(const char *at, const char *end, double value[ROW_WIDTH_MA
                 number_parse_double(token, (size_t)(at - token), &value[*count]) != NUMBER_OK)
                 return false;
             ++*count;
+            missing = false;
+        }
+        if (at < end && *at == ',') {
+            if (missing)
+                return false;
+            missing = true;
         }
         if (at < end && *at != '#')
             at++;

@@ -69,7 +69,8 @@ void raster_limits(const gbt_camera *camera, double low[2], double high[2]);
  * @param transmittance [out] optional (NULL), [height * width]
  * @param counters      [in,out] optional, added to
  * @return GBT_OK, GBT_ERR_ARGUMENT (a camera with another lens, settings out of range, size of rgb),
- *         GBT_ERR_NO_MEMORY (2^32 pairs of Gaussian and tile, 2^24 Gaussians in one tile, too)
+ *         GBT_ERR_NO_MEMORY (2^32 pairs of Gaussian and tile, 2^24 Gaussians in one tile, too),
+ *         GBT_ERR_INTERRUPTED (scene->stop)
  * Threads: uses all; same bits for every thread count and instruction set. Formulas, and what differs from
  * other rasterizers: docs/crosscheck.md. Memory: about 92 bytes per Gaussian (per ray: 172), 12 per pair; for
  * the adjoint 42 (58) more per pair and 8 per pixel.
@@ -90,6 +91,8 @@ gbt_status raster_forward(raster_scene *scene, const gaussians *g, const gbt_cam
  *                          tangent)
  * @param weight      [out] optional (NULL), [count]: sum over pixels of T alpha, how much each Gaussian was
  *                          seen
+ * @return GBT_OK, GBT_ERR_ARGUMENT (no such forward pass before, size of d_rgb), GBT_ERR_NO_MEMORY,
+ *         GBT_ERR_INTERRUPTED (scene->stop)
  * Threads: uses all; same bits for every thread count.
  */
 gbt_status raster_backward(raster_scene *scene, const image *d_rgb, gaussians *d_gaussians, float *weight,

@@ -171,11 +171,7 @@ gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt
 gbt_status check_memory(const char *path, const image_header &header, gbt_error *err)
 {
     const size_t samples = size_t(header.width) * size_t(header.height) * 4;
-    void *room = mem_alloc(samples + size_t(reader_bytes), sizeof(float) + 2, path, err);
-    if (room == nullptr)
-        return GBT_ERR_NO_MEMORY;
-    mem_free(room);
-    return GBT_OK;
+    return mem_check(samples + size_t(reader_bytes), sizeof(float) + 2, path, err);
 }
 
 gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt_error *err)

@@ -30,6 +30,8 @@ extern "C" void parallel_set_threads(int threads)
 try {
     if (threads < 1)
         threads = 1;
+    if (threads > PARALLEL_THREADS_MAX)
+        threads = PARALLEL_THREADS_MAX;
     wide.reset();
     limit.reset();
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,

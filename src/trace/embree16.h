@@ -89,7 +89,7 @@ static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, un
     for (unsigned bits = rays->active; bits != 0; bits &= bits - 1) {
         const int lane = __builtin_ctz(bits);
         const size_t begin = lane == 0 ? 0 : end[lane - 1], count = end[lane] - begin;
-        ray_state r = start_ray(rays, false, lane, scratch);
+        ray_state r = start_ray(rays, lane, scratch);
         if (!reserve_hits(&r, count, scratch))
             return false;
         if (count > 0) {

@@ -193,7 +193,7 @@ static inline void shortest_axis(const float *record, float normal[3])
         normal[k] = best[k] / sqrtf(square);
 }
 
-/* opacity exp(-d2 / 2). What 2^-120 cuts off is far below every alpha_min that can be set. */
+/* opacity exp(-d2 / 2). What 2^-120 cuts off is far below the least alpha_min that can be set, 1e-30. */
 static inline vfloat16 response_alpha(const gaussian_lanes *g, vfloat16 d2)
 {
     return vfloat16_mul(g->opacity, vfloat16_exp2(vfloat16_max(vfloat16_mul(vfloat16_set1(-0.72134752f), d2),

@@ -91,8 +91,9 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
         counters->tests += (uint64_t)take * PACKET_LANES;
         queue.count -= take;
         memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
-        /* What lies behind all hits of a ray that is opaque is not seen; at their depth, which is 0 where
-           they are cut there, it still may be. */
+        /* What lies behind all hits of a ray that is opaque is not seen, and left out also with packet_order,
+           which may put it in front of them; at their depth, which is 0 where they are cut there, it still
+           may be. */
         const vfloat16 behind =
             vfloat16_max(vfloat16_mul(sight.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
         sight.far =

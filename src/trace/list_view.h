@@ -113,7 +113,6 @@ typedef struct block_sums {
 typedef struct view_kept {
     size_t first;
     uint32_t records, general; /* general: those of them whose shapes are ellipsoids */
-    uint32_t rejected;         /* Gaussians with non-finite fields; the first face counts them */
 } view_kept;
 
 typedef struct list_view {

@@ -14,7 +14,7 @@ enum { RAY_ROUND = 80 };
 
 typedef struct ray_state {
     float transmittance, rgb[3];
-    float near, far, depth, weight, median, normal[3], top_weight;
+    float far, depth, weight, median, normal[3], top_weight;
     uint32_t blended, top_id;
     bool alive;
     float dir[3];
@@ -24,10 +24,9 @@ typedef struct ray_state {
     size_t count, capacity;
 } ray_state;
 
-static ray_state start_ray(const packet_rays *rays, bool parts, int lane, const kernel_scratch *scratch)
+static ray_state start_ray(const packet_rays *rays, int lane, const kernel_scratch *scratch)
 {
-    return (ray_state){.transmittance = parts ? rays->through[lane] : 1,
-                       .near = parts ? rays->near[lane] : 0,
+    return (ray_state){.transmittance = 1,
                        .far = rays->far[lane],
                        .median = INFINITY,
                        .top_id = UINT32_MAX,
@@ -44,7 +43,6 @@ static void finish_ray(const ray_state *r, const packet_rays *rays, int lane, pa
         out->normal[k][lane] = r->normal[k];
     }
     out->transmittance[lane] = r->transmittance;
-    out->ended |= (unsigned)!r->alive << lane;
     out->weighted_depth[lane] = r->depth, out->weight[lane] = r->weight, out->median_depth[lane] = r->median,
     out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
 }
@@ -201,9 +199,8 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     const gaussian_lanes g = load_gaussians(scene, id, color);
     const response at = respond(&g, ray, vfloat16_set1(scene->settings.t_near));
     const vfloat16 raw = response_alpha(&g, at.d2);
-    const vmask16 hit = vmask16_and(
-        vfloat16_le(alpha_threshold(scene, g.opacity), raw),
-        vmask16_and(vfloat16_le(vfloat16_set1(r->near), at.t), vfloat16_lt(at.t, vfloat16_set1(r->far))));
+    const vmask16 hit = vmask16_and(vfloat16_le(alpha_threshold(scene, g.opacity), raw),
+                                    vfloat16_lt(at.t, vfloat16_set1(r->far)));
     _Alignas(64) float t[TREE_WIDTH], alpha[TREE_WIDTH];
     vfloat16_store(t, at.t),
         vfloat16_store(alpha, vfloat16_min(raw, vfloat16_set1(scene->settings.alpha_max)));
@@ -275,12 +272,11 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *
     }
 }
 
-static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, bool parts, unsigned packet,
-                      int lane, packet_output *out, hit_tape *tape, kernel_scratch *scratch,
-                      kernel_counters *counters)
+static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane,
+                      packet_output *out, hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
 {
     packet_rays alone;
-    ray_state r = start_ray(rays, parts, lane, scratch);
+    ray_state r = start_ray(rays, lane, scratch);
     float origin[3];
     ray_lanes ray;
     for (int axis = 0; axis < 3; axis++) {

@@ -250,6 +250,9 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
                          GBT_CAMERA_SHUTTER_COLUMNS);
     if (!pose_is_finite(camera))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
+    if (!dmat_is_rotation(camera->rotation, 1e-3))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "camera: the rotation is not one (wanted orthonormal within 1e-3, no reflection)");
     if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)",
                          shot->aperture_radius);

@@ -22,8 +22,9 @@ typedef struct trace_settings {
     bool packet_order;   /* blend the hits of 4 x 4 neighbouring rays in one order, and not each ray's own in
                             its own order: first the Gaussians that one of them hits at t_near, by index; then
                             by their depth on a ray in the middle, which counts as at least half and at most
-                            twice that on the next ray that is hit. An approximation for training,
-                            docs/tracing.md; only rays that go over lists heed it. Default false */
+                            twice that on the next ray that is hit; hits behind those that have made a ray
+                            opaque may be left out. An approximation for training, docs/tracing.md; only rays
+                            that go over lists heed it. Default false */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

@@ -405,8 +405,8 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
         }
         counters->spilled_packets += rays->packet[p].active != 0;
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1)
-            if (!trace_ray(scene, &rays->packet[p], rays->parts, (unsigned)p, __builtin_ctz(bits), &out[p],
-                           tape, scratch, counters))
+            if (!trace_ray(scene, &rays->packet[p], (unsigned)p, __builtin_ctz(bits), &out[p], tape, scratch,
+                           counters))
                 return false;
     }
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
@@ -445,8 +445,7 @@ static bool forward_single(const kernel_scene *scene, const tile_rays *rays, pac
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++)
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1, counters->rays++)
-            if (!trace_ray(scene, &rays->packet[p], rays->parts, p, __builtin_ctz(bits), &out[p], tape,
-                           scratch, counters))
+            if (!trace_ray(scene, &rays->packet[p], p, __builtin_ctz(bits), &out[p], tape, scratch, counters))
                 return false;
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }

@@ -293,8 +293,10 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
                             &scene->listed, err));
     if (!scene->listed && rays->near != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "trace: parts of rays that have no lists (wanted TRACE_SINGLE)");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "trace: parts of rays that have no lists (wanted rays from one point within 1e17, and fewer "
+            "than 3e8 Gaussians)");
     return scene->listed ? GBT_OK : build_tree(scene, err);
 }
 
@@ -305,10 +307,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
     if (rgb->width != rays->width || rgb->height != rays->height || rgb->channels != 3)
         return base_fail(err, GBT_ERR_ARGUMENT, "trace: image is %d x %d x %d (wanted %d x %d x 3)",
                          rgb->width, rgb->height, rgb->channels, rays->width, rays->height);
-    if (rays->near != NULL && (keep_tape || (scene->kernel != TRACE_LIST && scene->kernel != TRACE_SINGLE)))
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "trace: parts of rays have no adjoint, and are traced by TRACE_LIST or TRACE_SINGLE");
+    if (rays->near != NULL && (keep_tape || scene->kernel != TRACE_LIST))
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "trace: parts of rays have no adjoint, and are traced by TRACE_LIST alone");
     GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
         .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};

@@ -84,10 +84,9 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
 /**
  * Trace rays.
  *
- * Parts of rays (rays->near) are traced by TRACE_LIST and TRACE_SINGLE, without an adjoint. A hit has the
+ * Parts of rays (rays->near) are traced by TRACE_LIST, over lists alone, without an adjoint. A hit has the
  * same t_c and alpha, to the bit, in every part and whatever else is in the scene; so parts that touch count
- * each hit once. Where TRACE_LIST can make no lists it does not walk the tree in their place: scene->listed
- * is then false after GBT_ERR_ARGUMENT.
+ * each hit once.
  *
  * @param keep_tape [in]  true when trace_backward() will follow: keeps about one byte per blended hit
  *                        (trace_scene.tape_bytes_max)

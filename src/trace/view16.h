@@ -95,7 +95,7 @@ static inline view_response view_respond(const view_gaussians *g, int i, const v
     return r;
 }
 
-/* 2^-120 is small enough: no alpha_min in use is smaller. */
+/* 2^-120 is small enough: the least alpha_min that can be set is 1e-30. */
 static inline vfloat16 view_alpha(const view_gaussians *g, int i, vfloat16 exponent)
 {
     return vfloat16_mul(vfloat16_set1(g->field[VIEW_OPACITY][i]),

@@ -15,7 +15,9 @@
 
 enum { GROUPS = 64 };
 
-/* Pairs of Gaussians that need their ellipsoids tested and parts: beyond this the tree is cheaper. */
+/* Pairs of Gaussians that need their ellipsoids tested and parts: beyond this the tree is cheaper. Parts of
+   rays are never traced by the tree, whose depths differ in rounding: a hit could be counted twice, or not at
+   all. */
 static const size_t general_pairs_most = (size_t)1 << 24;
 
 /* Blocks of records that are put into lists together. */
@@ -55,15 +57,13 @@ static void record_entry(size_t entry, size_t begin, size_t end, void *context)
     list_view *view = &job->lists->view;
     const bool one = view->face_count == 1;
     view_kept *kept = &view->kept[entry];
-    const view_kept before = *kept;
+    const size_t first = kept->first;
     (void)begin;
     (void)end;
-    *kept =
-        job->kernel->make_records(job->scene, job->g, face_of_entry(view, entry), entry % view->block_count,
-                                  one ? NULL : view->reached + entry * (VIEW_GRAIN / 16),
-                                  view->records + before.first, view->shapes + before.first);
-    kept->first = before.first;
-    kept->rejected += before.rejected;
+    *kept = job->kernel->make_records(
+        job->scene, job->g, face_of_entry(view, entry), entry % view->block_count,
+        one ? NULL : view->reached + entry * (VIEW_GRAIN / 16), view->records + first, view->shapes + first);
+    kept->first = first;
 }
 
 static gbt_status reserve_records(view_lists *lists, size_t count, gbt_error *err)
@@ -266,7 +266,7 @@ gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const k
                     .entries = (size_t)view->face_count * view->block_count};
     atomic_init(&job.failed, false);
     GBT_TRY(make_records_of(&job, err));
-    *usable = few_general(&job);
+    *usable = rays->near != NULL || few_general(&job);
     return *usable ? make_pairs(&job, err) : GBT_OK;
 }
 

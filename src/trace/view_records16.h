@@ -40,8 +40,7 @@ static inline void place_means(const gaussians *g, const view_frame *frame, size
 }
 
 /* Which of sixteen can be seen at all: the rule of bvh/proxy.c. */
-static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians *g, size_t first, size_t end,
-                                     uint32_t *rejected)
+static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians *g, size_t first, size_t end)
 {
     unsigned bits = 0;
     for (unsigned i = 0; i < 16 && first + i < end; i++) {
@@ -56,7 +55,6 @@ static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians 
         const bool sound = isfinite(g->opacity[at]) && g->scale_x[at] > 0 && g->scale_y[at] > 0 &&
                            g->scale_z[at] > 0 && isfinite(color) && reach < 1e17f; /* false for NaN too */
         bits |= (unsigned)sound << i;
-        *rejected += !sound;
     }
     return bits;
 }
@@ -168,9 +166,8 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
     const vfloat16 one = vfloat16_set1(1);
     const size_t begin = block * VIEW_GRAIN,
                  end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
-    uint32_t rejected = 0;
     for (size_t first = begin; first < end; first += 16) {
-        const unsigned visible = visible_lanes(scene, g, first, end, &rejected);
+        const unsigned visible = visible_lanes(scene, g, first, end);
         uint32_t id[16];
         for (unsigned i = 0; i < 16; i++)
             id[i] = (uint32_t)(first + i < end ? first + i : first);
@@ -210,13 +207,12 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
             view->kept[entry].records += (uint32_t)__builtin_popcount(bits);
         }
     }
-    view->kept[block].rejected = rejected;
 }
 
 static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_face *face,
                               size_t block, const uint16_t *reached, view_record *records, view_shape *shapes)
 {
-    uint32_t count = 0, general = 0, rejected = 0;
+    uint32_t count = 0, general = 0;
     const view_frame *frame = &face->frame;
     const slope_box *bounds = &face->bounds;
     const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
@@ -225,7 +221,7 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
                  end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible =
-            reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end, &rejected);
+            reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end);
         if (visible == 0)
             continue;
         uint32_t id[16];
@@ -287,7 +283,7 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
             count++;
         }
     }
-    return (view_kept){.records = count, .general = general, .rejected = rejected};
+    return (view_kept){.records = count, .general = general};
 }
 
 #endif

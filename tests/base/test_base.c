@@ -3,6 +3,7 @@
    arrays, images, threads, vectors. */
 #include <dirent.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <sys/resource.h>
@@ -336,6 +337,34 @@ static void files_come_back(void **state)
     assert_false(file_exists(path));
 }
 
+static void private_files_and_links_stay(void **state)
+{
+    (void)state;
+    char path[512], name[512];
+    struct stat info;
+    unsigned char *bytes;
+    size_t count;
+    assert_ok(file_join(path, sizeof path, folder, "a.bin", NULL));
+    assert_ok(file_join(name, sizeof name, folder, "link", NULL));
+    assert_ok(file_write_atomic(path, "old", 3, NULL));
+    assert_int_equal(chmod(path, 0600), 0);
+    assert_int_equal(symlink("a.bin", name), 0);
+    assert_ok(file_check_creatable(name, NULL));
+    assert_ok(file_write_atomic(name, "newer", 5, NULL));
+    assert_true(lstat(name, &info) == 0 && S_ISLNK(info.st_mode));
+    assert_int_equal(stat(path, &info), 0);
+    assert_int_equal(info.st_mode & 0777, 0600);
+    assert_ok(file_read(path, &bytes, &count, NULL));
+    assert_int_equal(count, 5);
+    assert_memory_equal(bytes, "newer", 5);
+    mem_free(bytes);
+    remove(path);
+    assert_ok(file_write_atomic(name, "x", 1, NULL)); /* leads to nothing now: the file takes its place */
+    assert_true(lstat(name, &info) == 0 && S_ISREG(info.st_mode));
+    assert_int_equal(entry_count(folder), 1);
+    remove(name);
+}
+
 static void failed_writes_leave_nothing(void **state)
 {
     (void)state;
@@ -617,6 +646,12 @@ static void blocks_cover_once(void **state)
         parallel_blocks(0, 16, cover, &ran);
         assert_int_equal(ran, 0);
     }
+    const int before = parallel_threads();
+    parallel_set_threads(INT_MAX);
+    assert_in_range(parallel_threads(), before, PARALLEL_THREADS_MAX);
+    parallel_set_threads(INT_MIN);
+    assert_int_equal(parallel_threads(), 1);
+    parallel_set_threads(before);
 }
 
 /* Long enough for any clock. */
@@ -798,6 +833,7 @@ int main(void)
         cmocka_unit_test(philox_known_answers),
         cmocka_unit_test(random_numbers_have_their_moments),
         cmocka_unit_test(files_come_back),
+        cmocka_unit_test(private_files_and_links_stay),
         cmocka_unit_test(failed_writes_leave_nothing),
         cmocka_unit_test(places_are_looked_at),
         cmocka_unit_test(streams_are_not_replaced),

@@ -57,7 +57,7 @@ static void small_arrays_are_memory(void **state)
     assert_false(paged_unmap(NULL));
     gbt_error err = {0};
     assert_null(mem_alloc((size_t)1 << 50, 1, "far too much", &err)); /* than there is on any disk */
-    assert_true(err.status == GBT_ERR_IO && strstr(err.text, "far too much") != NULL);
+    assert_true(err.status == GBT_ERR_NO_MEMORY && strstr(err.text, "far too much") != NULL);
     paged_stop();
 }
 

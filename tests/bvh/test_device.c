@@ -12,6 +12,8 @@
 
 #include "bvh/device.h"
 #include "bvh/embree_api.h"
+#include "bvh/gaussian_scene.h"
+#include "bvh/gaussian_tree.h"
 #include "bvh/mesh.h"
 #include "bvh/points.h"
 
@@ -27,6 +29,9 @@ static void no_device_is_an_error(void **state)
     (void)state;
     if (SANITIZED)
         skip(); /* sanitizers need the address space themselves */
+    gaussians g = {0};
+    assert_ok(gaussians_resize(&g, 1, NULL));
+    gaussians_pad(&g);
     const pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
@@ -48,16 +53,26 @@ static void no_device_is_an_error(void **state)
         const float point[3] = {1, 2, 3};
         point_tree *points = (point_tree *)&err;
         err = (gbt_error){0};
-        if (point_tree_build(number_floats(point), (number_array){0}, 1, &points, &err) == GBT_OK ||
-            points != NULL || err.text[0] == '\0')
+        gbt_status status = point_tree_build(number_floats(point), (number_array){0}, 1, &points, &err);
+        if (status == GBT_OK || status != err.status || points != NULL || err.text[0] == '\0')
             _exit(14);
         const float vertices[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
         const uint32_t corners[3] = {0, 1, 2};
         mesh_tree *mesh = (mesh_tree *)&err;
         err = (gbt_error){0};
-        if (mesh_tree_build(vertices, 3, corners, 1, &mesh, &err) == GBT_OK || mesh != NULL ||
-            err.text[0] == '\0')
+        status = mesh_tree_build(vertices, 3, corners, 1, &mesh, &err);
+        if (status == GBT_OK || status != err.status || mesh != NULL || err.text[0] == '\0')
             _exit(15);
+        gaussian_tree tree = {0};
+        err = (gbt_error){0};
+        status = gaussian_tree_build(&g, 0.01f, INFINITY, 1, &tree, &err);
+        if (status == GBT_OK || status != err.status || err.text[0] == '\0')
+            _exit(17);
+        gaussian_scene scene = {0};
+        err = (gbt_error){0};
+        status = gaussian_scene_build(&g, 0.01f, INFINITY, 1, &scene, &err);
+        if (status == GBT_OK || status != err.status || err.text[0] == '\0')
+            _exit(18);
         if (bvh_embree_version()[0] != '3' && bvh_embree_version()[0] != '4')
             _exit(16);
         _exit(0);
@@ -68,6 +83,7 @@ static void no_device_is_an_error(void **state)
     if (WEXITSTATUS(how) == 77)
         skip();
     assert_int_equal(WEXITSTATUS(how), 0);
+    gaussians_free(&g);
 }
 
 static void *ask_device(void *argument)

@@ -721,6 +721,42 @@ static void stacks_are_not_quadratic(void **state)
     mem_free(spacing);
 }
 
+/* Every outlier takes a node of the tree, which is as deep as there are outliers of other sizes. */
+static void many_coincide_among_outliers(void **state)
+{
+    (void)state;
+    enum { SAME = 3000, SIZES = 27, COUNT = SAME + 6 * SIZES };
+    static float position[3 * COUNT];
+    static ranked rank[COUNT];
+    static bool wanted[COUNT];
+    for (int i = 0; i < SIZES; i++)
+        for (size_t side = 0; side < 6; side++)
+            position[3 * (SAME + 6 * (size_t)i + side) + side / 2] =
+                (float)((side % 2 == 0 ? 1 : -1) * pow(30, i - 6));
+    point_tree *tree = NULL;
+    gbt_error err = {0};
+    if (build(position, NULL, COUNT, &tree, &err) != GBT_OK)
+        fail_msg("%s", err.text);
+    point_list list = {0};
+    for (size_t q = 0; q < COUNT; q += q < SAME ? 750 : 1) {
+        const float *query = position + 3 * q, reach = 1.5f * (fabsf(query[0]) + fabsf(query[1]));
+        uint32_t index[MAX_K];
+        double d2[MAX_K];
+        for (size_t i = 0; i < COUNT; i++) {
+            rank[i] = (ranked){brute_distance_squared(position + 3 * i, query), (uint32_t)i};
+            wanted[i] = rank[i].d2 <= (double)reach * (double)reach;
+        }
+        assert_ok(within(tree, query, reach, &list, NULL));
+        expect_list("within", "outliers", q, &list, wanted, COUNT);
+        qsort(rank, COUNT, sizeof *rank, compare_ranked);
+        assert_int_equal(nearest(tree, query, MAX_K, SIZE_MAX, index, d2), MAX_K);
+        for (size_t i = 0; i < MAX_K; i++)
+            assert_true(index[i] == rank[i].index && d2[i] == rank[i].d2);
+    }
+    point_list_free(&list);
+    point_tree_free(tree);
+}
+
 static void no_memory(void **state)
 {
     (void)state;
@@ -911,6 +947,7 @@ int main(void)
         cmocka_unit_test(bad_points_are_named),
         cmocka_unit_test(agrees_with_flann),
         cmocka_unit_test(stacks_are_not_quadratic),
+        cmocka_unit_test(many_coincide_among_outliers),
         cmocka_unit_test(no_memory),
         cmocka_unit_test(garden),
         cmocka_unit_test(same_answers_for_any_threads),

@@ -4,6 +4,8 @@
 #include "test_support.h"
 
 #include <fcntl.h>
+#include <signal.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,6 +13,7 @@
 #include "base/image.h"
 #include "base/image_header.h"
 #include "base/memory.h"
+#include "base/paged.h"
 #include "exr_file.h"
 
 static char folder[] = "/tmp/gbt_image_XXXXXX";
@@ -589,6 +592,30 @@ static void no_memory(void **state)
     }
 }
 
+/* Below a memory limit large arrays are files: whether there is memory for a picture is asked without one. */
+static void asks_for_memory_without_a_file(void **state)
+{
+    (void)state;
+    const buffer b = make_png(2, 1, 8, 2, "abcdef", 6);
+    save("h.png", &b);
+    image im;
+    gbt_error err = {0};
+    struct rlimit keep, tight;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &keep), 0);
+    tight = keep;
+    tight.rlim_cur = 1 << 20;
+    assert_ok(paged_start(folder, (size_t)1 << 40, NULL));
+    void (*const handler)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
+    const gbt_status status = image_read(at("h.png"), &im, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &keep), 0);
+    signal(SIGXFSZ, handler);
+    paged_stop();
+    if (status != GBT_OK)
+        fail_msg("%s", err.text);
+    image_free(&im);
+}
+
 static void reads_real_photos(void **state)
 {
     (void)state;
@@ -616,7 +643,7 @@ static void reads_real_photos(void **state)
 int main(void)
 {
     enum { PNG_COUNT = sizeof png_cases / sizeof *png_cases };
-    struct CMUnitTest tests[PNG_COUNT + 15];
+    struct CMUnitTest tests[PNG_COUNT + 16];
     size_t count = 0;
     for (; count < PNG_COUNT; count++)
         tests[count] = (struct CMUnitTest){
@@ -636,6 +663,7 @@ int main(void)
         cmocka_unit_test(refuses_multipart_and_deep_exr),
         cmocka_unit_test(write_refusals),
         cmocka_unit_test(no_memory),
+        cmocka_unit_test(asks_for_memory_without_a_file),
         cmocka_unit_test(reads_real_photos),
     };
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)

@@ -348,8 +348,8 @@ static void settings_are_checked(void **state)
     gbt_model *model = made();
     const gbt_model_settings fine = gbt_model_get_settings(model);
     assert_true(fine.footprint == 0.1f && fine.alpha_max == 0.99f && fine.background[1] == 0);
-    gbt_model_settings rows[9];
-    for (int i = 0; i < 9; i++)
+    gbt_model_settings rows[10];
+    for (int i = 0; i < 10; i++)
         rows[i] = fine;
     rows[0].background[2] = NAN;
     rows[1].footprint = 5;
@@ -360,7 +360,8 @@ static void settings_are_checked(void **state)
     rows[6].footprint = NAN;
     rows[7].t_near = INFINITY;
     rows[8].alpha_max = 0.99f * fine.alpha_min;
-    for (int i = 0; i < 9; i++) {
+    rows[9].alpha_min = 0.9e-30f;
+    for (int i = 0; i < 10; i++) {
         gbt_error err = {0};
         assert_refused(gbt_model_set_settings(model, &rows[i], &err), &err, GBT_ERR_ARGUMENT, "settings:");
         const gbt_model_settings now = gbt_model_get_settings(model);
@@ -434,13 +435,18 @@ static void what_is_not_rendered(void **state)
     double pose[6];
     gbt_model *model = made();
     const gbt_picture picture = {.rgb = rgb};
-    gbt_camera bad = camera;
+    gbt_camera bad = camera, twice_as_large = camera;
     bad.params[0] = 0;
-    gbt_error no_rgb = {0}, no_camera = {0}, not_kept = {0}, twice = {0}, nan = {0}, changed = {0};
+    for (int k = 0; k < 9; k++)
+        twice_as_large.rotation[k] *= 2;
+    gbt_error no_rgb = {0}, no_camera = {0}, no_rotation = {0}, not_kept = {0}, twice = {0}, nan = {0},
+              changed = {0};
     assert_refused(gbt_model_render(model, &camera, 0, &(gbt_picture){0}, &no_rgb), &no_rgb, GBT_ERR_ARGUMENT,
                    "rgb is NULL");
     assert_refused(gbt_model_render(model, &bad, 1, &picture, &no_camera), &no_camera, GBT_ERR_ARGUMENT,
                    "camera");
+    assert_refused(gbt_model_render(model, &twice_as_large, 1, &picture, &no_rotation), &no_rotation,
+                   GBT_ERR_ARGUMENT, "rotation");
     assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &not_kept), &not_kept, GBT_ERR_ARGUMENT,
                    "keep");
     assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));

@@ -186,6 +186,9 @@ static void what_is_refused(void **state)
                    GBT_ERR_ARGUMENT, "point 1: bad coordinate");
     assert_null(balls);
     err = (gbt_error){0};
+    assert_refused(gbt_balls_from_arrays((double[]){0, -1e101, 0}, NULL, 1, &balls, &err), &err,
+                   GBT_ERR_ARGUMENT, "wanted -1e100 to 1e100, got -1e+101");
+    err = (gbt_error){0};
     assert_refused(gbt_balls_from_arrays((double[]){0, 0, 0}, (double[]){-1}, 1, &balls, &err), &err,
                    GBT_ERR_ARGUMENT, "point 0: bad radius");
     make(1, 0);
@@ -206,6 +209,12 @@ static void what_is_refused(void **state)
     err = (gbt_error){0};
     assert_refused(gbt_balls_crossed(balls, good, good, NULL, NULL, 1, &a, &err), &err, GBT_ERR_ARGUMENT,
                    "query 0: points: bad ray");
+    err = (gbt_error){0};
+    assert_refused(gbt_balls_crossed(balls, good, (double[]){0, 1e-101, 0}, NULL, NULL, 1, &a, &err), &err,
+                   GBT_ERR_ARGUMENT, "a component from 1e-100 to 1e100");
+    err = (gbt_error){0};
+    assert_refused(gbt_balls_containing(balls, (double[]){0, 0, 1e101}, 1, &a, &err), &err, GBT_ERR_ARGUMENT,
+                   "wanted coordinates from -1e100 to 1e100");
     assert_null(a.index);
     gbt_balls_free(balls);
 }
@@ -288,6 +297,16 @@ static void files_of_balls_and_queries(void **state)
     err = (gbt_error){0};
     def.at = "1,2,3";
     assert_refused(gbt_query(bad, &def, stdout, &err), &err, GBT_ERR_FORMAT, ":2: not a row of numbers");
+    static const char *const gaps[] = {"1,,2,3", ",1,2,3", "1, ,2,3", "1,2,3,,", " , 1 2 3", ","};
+    for (size_t i = 0; i < sizeof gaps / sizeof *gaps; i++) {
+        err = (gbt_error){0};
+        def.at = gaps[i];
+        assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT,
+                       "at:1: not a row of numbers");
+    }
+    def.at = "0 , 0\t,3, # a comma at the end may stay";
+    expect_printed(balls, &def, "query,rank,ball,distance,x,y,z,radius\n0,0,0,3,0,0,0,1\n");
+    def.at = "1,2,3";
     err = (gbt_error){0};
     assert_refused(gbt_query("/nowhere/run", &def, stdout, &err), &err, GBT_ERR_IO, "/nowhere/run");
     err = (gbt_error){0};

@@ -327,58 +327,109 @@ static void parts_of_rays(void **state)
         through[i] = mem_alloc(RAYS, sizeof *through[i], "test", NULL);
     for (size_t i = 0; i < RAYS; i++)
         cut[i] = 3 + 4 * rng_uniform(1, 3, i);
-    for (int kernel = TRACE_LIST; kernel <= TRACE_SINGLE; kernel += TRACE_SINGLE - TRACE_LIST) {
-        pass_result *whole = run(&g, &s, &rays, (trace_kernel)kernel, 0);
-        trace_scene scene = {.kernel = (trace_kernel)kernel};
-        image rgb, sum;
-        assert_ok(image_alloc(&rgb, WIDTH, HEIGHT, 3, NULL));
-        assert_ok(image_alloc(&sum, WIDTH, HEIGHT, 3, NULL));
-        memset(sum.pixels, 0, 3 * RAYS * sizeof *sum.pixels);
-        assert_ok(trace_build(&scene, &g, &s, 5, NULL));
-        ray_image part = rays;
-        part.near = mem_alloc(RAYS, sizeof *part.near, "test", NULL);
-        part.far = mem_alloc(RAYS, sizeof *part.far, "test", NULL);
-        part.through = mem_alloc(RAYS, sizeof *part.through, "test", NULL);
-        for (int half = 0; half < 2; half++) {
-            for (size_t i = 0; i < RAYS; i++) {
-                part.near[i] = half == 0 ? 0 : cut[i];
-                part.far[i] = half == 0 ? cut[i] : ended[i] != 0 ? 0 : INFINITY;
-                part.through[i] = half == 0 ? 1 : through[0][i];
-            }
-            const trace_outputs out = {.rgb = &rgb, .transmittance = through[half], .ended = ended};
-            assert_ok(trace_forward(&scene, &part, false, &out, NULL, NULL));
-            assert_ok(reference_forward(&g, &s, &part, wanted, wanted + 3 * RAYS, NULL, NULL));
-            size_t off = 0;
-            for (size_t i = 0; i < RAYS; i++) {
-                double error = fabs(wanted[3 * RAYS + i] - (double)through[half][i]);
-                for (size_t c = 0; c < 3; c++) {
-                    error = fmax(error, fabs(wanted[3 * i + c] - (double)rgb.pixels[3 * i + c]));
-                    sum.pixels[3 * i + c] += rgb.pixels[3 * i + c];
-                }
-                off += !(error < 2e-5);
-            }
-            assert_true(off <= RAYS / 200); /* a hit at a cut may be on the other side */
+    pass_result *whole = run(&g, &s, &rays, TRACE_LIST, 0);
+    trace_scene scene = {.kernel = TRACE_LIST};
+    image rgb, sum;
+    assert_ok(image_alloc(&rgb, WIDTH, HEIGHT, 3, NULL));
+    assert_ok(image_alloc(&sum, WIDTH, HEIGHT, 3, NULL));
+    memset(sum.pixels, 0, 3 * RAYS * sizeof *sum.pixels);
+    assert_ok(trace_build(&scene, &g, &s, 5, NULL));
+    ray_image part = rays;
+    part.near = mem_alloc(RAYS, sizeof *part.near, "test", NULL);
+    part.far = mem_alloc(RAYS, sizeof *part.far, "test", NULL);
+    part.through = mem_alloc(RAYS, sizeof *part.through, "test", NULL);
+    for (int half = 0; half < 2; half++) {
+        for (size_t i = 0; i < RAYS; i++) {
+            part.near[i] = half == 0 ? 0 : cut[i];
+            part.far[i] = half == 0 ? cut[i] : ended[i] != 0 ? 0 : INFINITY;
+            part.through[i] = half == 0 ? 1 : through[0][i];
         }
-        for (size_t i = 0; i < 3 * RAYS; i++) /* the background is black */
-            if (!(fabsf(sum.pixels[i] - whole->rgb.pixels[i]) < 3e-6f))
-                fail_msg("%s: value %zu is %g in parts, %g whole", kernel_names[kernel], i,
-                         (double)sum.pixels[i], (double)whole->rgb.pixels[i]);
-        gbt_error err = {0};
-        assert_int_equal(trace_forward(&scene, &part, true, &(trace_outputs){.rgb = &rgb}, NULL, &err),
-                         GBT_ERR_ARGUMENT); /* there is no adjoint */
-        mem_free(part.near);
-        mem_free(part.far);
-        mem_free(part.through);
-        trace_scene_free(&scene);
-        image_free(&rgb);
-        image_free(&sum);
-        pass_free(whole);
+        const trace_outputs out = {.rgb = &rgb, .transmittance = through[half], .ended = ended};
+        assert_ok(trace_forward(&scene, &part, false, &out, NULL, NULL));
+        assert_ok(reference_forward(&g, &s, &part, wanted, wanted + 3 * RAYS, NULL, NULL));
+        size_t off = 0;
+        for (size_t i = 0; i < RAYS; i++) {
+            double error = fabs(wanted[3 * RAYS + i] - (double)through[half][i]);
+            for (size_t c = 0; c < 3; c++) {
+                error = fmax(error, fabs(wanted[3 * i + c] - (double)rgb.pixels[3 * i + c]));
+                sum.pixels[3 * i + c] += rgb.pixels[3 * i + c];
+            }
+            off += !(error < 2e-5);
+        }
+        assert_true(off <= RAYS / 200); /* a hit at a cut may be on the other side */
     }
+    for (size_t i = 0; i < 3 * RAYS; i++) /* the background is black */
+        if (!(fabsf(sum.pixels[i] - whole->rgb.pixels[i]) < 3e-6f))
+            fail_msg("%s: value %zu is %g in parts, %g whole", kernel_names[TRACE_LIST], i,
+                     (double)sum.pixels[i], (double)whole->rgb.pixels[i]);
+    gbt_error err = {0};
+    assert_int_equal(trace_forward(&scene, &part, true, &(trace_outputs){.rgb = &rgb}, NULL, &err),
+                     GBT_ERR_ARGUMENT); /* there is no adjoint */
+    for (int kernel = TRACE_LIST + 1; kernel <= TRACE_EMBREE; kernel++) {
+        scene.kernel = (trace_kernel)kernel;
+        assert_int_equal(trace_forward(&scene, &part, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL),
+                         GBT_ERR_ARGUMENT);
+    }
+    mem_free(part.near);
+    mem_free(part.far);
+    mem_free(part.through);
+    trace_scene_free(&scene);
+    image_free(&rgb);
+    image_free(&sum);
+    pass_free(whole);
     mem_free(wanted);
     mem_free(cut);
     mem_free(ended);
     for (int i = 0; i < 2; i++)
         mem_free(through[i]);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
+/* More near the eye than lists are worth for whole rays: parts of rays never go through the tree. */
+static void parts_are_listed_whatever_is_near(void **state)
+{
+    (void)state;
+    enum { SIDE = 1024, ALL = SIDE * SIDE };
+    const trace_settings s = trace_settings_default();
+    gaussians g = cloud(4200, 9, 0.8f, 0.2f, 1);
+    ray_image rays = {0};
+    image rgb[2];
+    assert_ok(ray_image_reserve(&rays, SIDE, SIDE, true, NULL));
+    for (size_t i = 0; i < g.count; i++) { /* large, and so faint that they are seen in a few pixels */
+        g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = 3;
+        g.opacity[i] = 1.0001f * s.alpha_min;
+    }
+    rays.origin[0] = rays.origin[1] = 0;
+    rays.origin[2] = -5;
+    for (size_t i = 0; i < ALL; i++) {
+        double d[3] = {((double)(i % SIDE) - SIDE / 2) * 1e-3, ((double)(i / SIDE) - SIDE / 2) * 1e-3, 1};
+        dvec_normalize(d);
+        for (size_t k = 0; k < 3; k++)
+            rays.dir[3 * i + k] = (float)d[k];
+    }
+    trace_scene scene = {0};
+    assert_ok(trace_build(&scene, &g, &s, 5, NULL));
+    for (int parts = 0; parts < 2; parts++) {
+        assert_ok(image_alloc(&rgb[parts], SIDE, SIDE, 3, NULL));
+        if (parts == 1) {
+            rays.near = mem_calloc(ALL, sizeof *rays.near, "test", NULL);
+            rays.through = mem_alloc(ALL, sizeof *rays.through, "test", NULL);
+            for (size_t i = 0; i < ALL; i++)
+                rays.through[i] = 1;
+        }
+        assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb[parts]}, NULL, NULL));
+        assert_int_equal(scene.listed, parts);
+    }
+    size_t seen = 0, off = 0;
+    for (size_t i = 0; i < (size_t)3 * ALL; i++) {
+        seen += rgb[1].pixels[i] > 0;
+        off += fabsf(rgb[0].pixels[i] - rgb[1].pixels[i]) > 1e-5f;
+    }
+    assert_true(seen > 100000 && off < seen / 100);
+    for (int k = 0; k < 2; k++)
+        image_free(&rgb[k]);
+    trace_scene_free(&scene);
     ray_image_free(&rays);
     gaussians_free(&g);
 }
@@ -536,6 +587,7 @@ int main(void)
         cmocka_unit_test(kernels_share_the_adjoint),
         cmocka_unit_test(surfaces_and_radius),
         cmocka_unit_test(parts_of_rays),
+        cmocka_unit_test(parts_are_listed_whatever_is_near),
         cmocka_unit_test(hits_are_sorted),
         cmocka_unit_test(no_room_for_the_tape),
         cmocka_unit_test(rows_are_in_exact_order),

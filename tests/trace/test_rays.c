@@ -389,8 +389,8 @@ static void nothing_comes_from_nothing(void **state)
 static void bad_shots(void **state)
 {
     (void)state;
-    ray_shot bad[14];
-    for (int i = 0; i < 14; i++) {
+    ray_shot bad[17];
+    for (int i = 0; i < 17; i++) {
         bad[i] = shot_of(i == 9 ? GBT_CAMERA_ORTHOGRAPHIC : GBT_CAMERA_PINHOLE);
         bad[i].aperture_radius = 0.1;
         bad[i].focus_distance = 1;
@@ -409,7 +409,12 @@ static void bad_shots(void **state)
     bad[11].camera.width = 0;
     bad[12].camera.model = (gbt_camera_model)99;
     bad[13].camera.shutter = (gbt_camera_shutter)3;
-    for (int i = 0; i < 14; i++) {
+    for (int k = 0; k < 9; k++) { /* no rotations: twice one, none at all, a reflection */
+        bad[14].camera.rotation[k] *= 2;
+        bad[15].camera.rotation[k] = 0;
+        bad[16].camera.rotation[k] *= k < 3 ? -1 : 1;
+    }
+    for (int i = 0; i < 17; i++) {
         ray_image rays = {0};
         gbt_error err = {0};
         assert_int_equal(ray_image_from_shot(&bad[i], 0, &rays, &err), GBT_ERR_ARGUMENT);

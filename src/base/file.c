@@ -136,12 +136,11 @@ static gbt_status check_folder(const char *folder, const char *path, gbt_error *
 
 gbt_status file_check_creatable(const char *path, gbt_error *err)
 {
-    char folder[PATH_LIMIT], real[FILE_NAME_MOST];
+    char folder[PATH_LIMIT];
     if (file_is_stream(path))
         return access(path, W_OK) == 0
                    ? GBT_OK
                    : base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
-    path = file_behind(path, real);
     folder_of(path, folder);
     GBT_TRY(check_folder(folder, path, err));
     return file_is_folder(path) ? base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(EISDIR))
@@ -242,12 +241,6 @@ bool file_is_stream(const char *path)
     struct stat info;
     return stat(path, &info) == 0 && !S_ISDIR(info.st_mode) &&
            (!S_ISREG(info.st_mode) || strncmp(path, "/dev/std", 8) == 0 || strncmp(path, "/dev/fd/", 8) == 0);
-}
-
-const char *file_behind(const char *path, char real[FILE_NAME_MOST])
-{
-    struct stat info;
-    return lstat(path, &info) == 0 && S_ISLNK(info.st_mode) && realpath(path, real) != NULL ? real : path;
 }
 
 bool file_is_same(const char *a, const char *b)

@@ -40,7 +40,7 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  *
  * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
  * we see. A device, a pipe or /dev/stdout is written to as it is. Who may read and write the file stays as it
- * was; of a link the file that it leads to is replaced.
+ * was; a link is replaced, and what it leads to stays.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
@@ -84,11 +84,6 @@ typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
    to /dev/null would take its place. */
 bool file_is_stream(const char *path);
 
-enum { FILE_NAME_MOST = 4096 };
-
-/** The file that a link leads to, in `real`; `path` where it is no link, or leads to nothing. */
-const char *file_behind(const char *path, char real[FILE_NAME_MOST]);
-
 /** What is at a path; errors as of file_stat(). */
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err);
 
@@ -99,7 +94,7 @@ bool file_is_folder(const char *path);
 /** Whether both are there, and are one file or folder, whatever they are called. */
 bool file_is_same(const char *a, const char *b);
 
-/** Whether what is written to the one is written to the other: the same path, or one file that is there. */
+/** Whether both name one file: the same path, or one file that is there. */
 bool file_is_one(const char *a, const char *b);
 
 /** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */

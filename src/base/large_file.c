@@ -41,10 +41,8 @@ gbt_status large_file_open(const char *path, large_file *out, gbt_error *err)
 
 gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
 {
-    char real[FILE_NAME_MOST];
     struct stat old;
     const bool stream = file_is_stream(path);
-    path = stream ? path : file_behind(path, real);
     GBT_TRY(set_name(out, path, err));
     const char *slash = strrchr(path, '/');
     const int folder_length = slash == NULL ? 0 : (int)(slash - path) + 1;

@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "train/align.h"
 #include "train/growing.h"
@@ -246,15 +247,17 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
-    if (t->poses.count > 0)
-        GBT_TRY(align_held_out(t, err));
+    gbt_status status = t->poses.count > 0 ? align_held_out(t, err) : GBT_OK;
     double sum = 0;
     size_t count = 0;
     image photo = {0};
-    gbt_status status = GBT_OK;
     for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
         if (!t->scene.views[i].is_test)
             continue;
+        if (stop_signal_seen()) {
+            status = base_fail(err, GBT_ERR_INTERRUPTED, "stopped while held-out photos were scored");
+            break;
+        }
         unsigned char *marks = NULL;
         const unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
@@ -275,6 +278,9 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         image_free(&photo);
         mem_free(marks);
     }
+    for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* files are to have no other */
+        if (t->scene.views[i].is_test)
+            t->scene.views[i].camera = t->poses.given[i];
     *psnr = count > 0 ? sum / (double)count : (double)NAN;
     return status;
 }

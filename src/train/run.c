@@ -177,7 +177,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
 {
     const gbt_train_def *def = &t->def;
     if (!report->skipped)
-        budget_follow(&c->measured, &t->rules, report, pace_progress(&t->pace, t->step - 1));
+        budget_follow(&c->measured, t, t->step - 1, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
     if (!save_is_under_way(c->saving))

@@ -197,13 +197,14 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1),
                  views = t->def.views, steps = views * pace_expected(&t->pace, t->step);
-    const bool learns = t->rules.last_step_learns || next < 1;
+    const bool learns = t->rules.last_step_learns || next < 1,
+               by_time = t->def.iterations == 0 || t->def.pace != NULL;
+    const double looks = steps / t->photo_steps * (by_time && progress < SCHEDULE_LENGTH_KNOWN ? 0.5 : 1);
     const learning_rates rates = learning_rates_at(
         train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->rules.geometry_from,
         t->extent, t->def.learning_rate_factor * sqrt(views), schedule_rate_end(steps), t->def.views);
-    t->left_out = t->rules.leaves_out && train_rules_are_loose(&t->rules, progress)
-                      ? schedule_left_out(steps / t->photo_steps)
-                      : 0;
+    t->left_out =
+        t->rules.leaves_out && train_rules_are_loose(&t->rules, progress) ? schedule_left_out(looks) : 0;
 
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));

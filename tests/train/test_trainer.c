@@ -477,6 +477,31 @@ static void a_budget_run_resumes_its_clock(void **state)
     json_decref(summary);
 }
 
+/* 150 looks at each photo; by time half as many are counted on at first, whoever repeats the pace. */
+static void a_length_by_time_is_known_late(void **state)
+{
+    (void)state;
+    char words[PACE_TEXT_SIZE];
+    for (int by_time = 0; by_time < 2; by_time++) {
+        trainer t;
+        step_report r;
+        gbt_train_def def = run_def();
+        def.iterations = 150 * 7;
+        open_ok(&t, tiny, &def);
+        assert_true(t.train_count == 7 && t.photo_steps == 7);
+        pace_text(&t.pace, words);
+        trainer_free(&t);
+        def.pace = by_time ? words : NULL;
+        open_ok(&t, tiny, &def);
+        step_ok(&t, &r);
+        assert_true((t.left_out > 0) == !by_time);
+        t.step = def.iterations / 2;
+        step_ok(&t, &r);
+        assert_true(t.left_out > 0);
+        trainer_free(&t);
+    }
+}
+
 /* ---- what a step does ---- */
 
 static void assert_rows_agree(const trainer *t)
@@ -2062,6 +2087,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_decimal_comma_changes_no_file),
         cmocka_unit_test(a_budget_gives_its_parts_equal_times),
         cmocka_unit_test(a_budget_run_resumes_its_clock),
+        cmocka_unit_test(a_length_by_time_is_known_late),
         cmocka_unit_test(training_learns),
         cmocka_unit_test(without_growing_the_anchors_stay),
         cmocka_unit_test(growth_stops_at_max_anchors),

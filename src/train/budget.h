@@ -8,15 +8,15 @@
 
 #include "train/trainer.h"
 
-/** How long a step takes: so much by itself and so much per pixel of its first view, with the hits of loose
-    rays; followed as the run changes. {0} knows nothing. */
+/** How long a step takes: so much by itself and so much times the root of the pixels of its first view, with
+    the hits of loose rays; means over about the last quarter of a part. {0} knows nothing. */
 typedef struct step_speed {
-    double fixed_seconds, pixel_seconds;
-    bool known;
+    double fixed_seconds, load_seconds;
+    uint64_t steps; /* measured */
 } step_speed;
 
-/** @param progress of the step that `r` is of, as in schedule.h */
-void budget_follow(step_speed *s, const train_rules *rules, const step_report *r, double progress);
+/** @param step that `r` is of, in a known part of t->pace */
+void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_report *r);
 
 /** Give the next part of t->pace its steps, by t->seconds of def.budget_seconds. */
 void budget_extend(trainer *t, const step_speed *s);

@@ -91,6 +91,56 @@ static uint64_t hash_of_geometry(const trainer *t)
     return hash;
 }
 
+/* Which views are held out. */
+static uint64_t hash_of_split(const trainer *t)
+{
+    uint64_t hash = HASH_START;
+    for (size_t i = 0; i < t->scene.view_count; i++)
+        hash = hash_bytes(hash, t->scene.views[i].is_test ? "1" : "0", 1);
+    return hash;
+}
+
+/* The colours of the sparse points, and what is kept of their tracks. */
+static uint64_t hash_of_points(const trainer *t)
+{
+    const scene_points *points = &t->scene.points;
+    uint64_t hash = hash_bytes(HASH_START, points->color, points->count * 3 * sizeof *points->color);
+    for (size_t i = 0; i < t->scene.view_count; i++) {
+        char text[32];
+        hash =
+            hash_bytes(hash, text, (size_t)snprintf(text, sizeof text, "%.6g ", t->scene.views[i].nearest));
+    }
+    return hash;
+}
+
+/* In the order of checkpoint_hash_data(). */
+static const struct {
+    const char *section, *other;
+} data_hashes[CHECKPOINT_DATA_HASHES] = {
+    {"views", "photos of other names, sizes or cameras"},
+    {"split", "other photos held out"},
+    {"geometry", "photos with other lenses or directions, or other sparse points"},
+    {"points", "other colours or tracks of the sparse points"},
+    {"photos", "photos of the same names, but other pictures"},
+    {"masks", "other masks"},
+};
+
+void checkpoint_hash_data(const trainer *t, uint64_t out[CHECKPOINT_DATA_HASHES])
+{
+    const uint64_t all[CHECKPOINT_DATA_HASHES] = {hash_of_views(t),  hash_of_split(t), hash_of_geometry(t),
+                                                  hash_of_points(t), t->photos_hash,   t->masks_hash};
+    memcpy(out, all, sizeof all);
+}
+
+const char *checkpoint_data_difference(const uint64_t a[CHECKPOINT_DATA_HASHES],
+                                       const uint64_t b[CHECKPOINT_DATA_HASHES])
+{
+    for (int i = 0; i < CHECKPOINT_DATA_HASHES; i++)
+        if (a[i] != b[i])
+            return data_hashes[i].other;
+    return NULL;
+}
+
 static gbt_status hash_ends(const char *path, uint64_t *hash, gbt_error *err)
 {
     unsigned char ends[2 * PHOTO_END_BYTES + sizeof(uint64_t)];
@@ -157,10 +207,10 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     container_add_small(&w, "in_row", CONTAINER_U64, 3,
                         (const uint64_t[]){t->skipped_in_row, t->empty_in_row, t->opacity_raises});
     container_add_small(&w, "seconds", CONTAINER_F64, 1, &t->seconds);
-    container_add_small(&w, "views", CONTAINER_U64, 1, (const uint64_t[]){hash_of_views(t)});
-    container_add_small(&w, "geometry", CONTAINER_U64, 1, (const uint64_t[]){hash_of_geometry(t)});
-    container_add_small(&w, "photos", CONTAINER_U64, 1, &t->photos_hash);
-    container_add_small(&w, "masks", CONTAINER_U64, 1, &t->masks_hash);
+    uint64_t of_data[CHECKPOINT_DATA_HASHES];
+    checkpoint_hash_data(t, of_data);
+    for (int i = 0; i < CHECKPOINT_DATA_HASHES; i++)
+        container_add_small(&w, data_hashes[i].section, CONTAINER_U64, 1, &of_data[i]);
     const exposures *e = &t->exposures;
     const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
     if (e->count > 0) {
@@ -267,13 +317,16 @@ static gbt_status read_creation(trainer *t, const container *c, const char *path
 }
 
 /* Older checkpoints do not have each section. */
-static gbt_status check_hash(const trainer *t, const container *c, const char *path, const char *section,
-                             uint64_t own, const char *other, gbt_error *err)
+static gbt_status check_data(const trainer *t, const container *c, const char *path, gbt_error *err)
 {
-    uint64_t saved = own;
-    if (container_section_named(c, section) != NULL)
-        GBT_TRY(container_get(c, section, CONTAINER_U64, 1, &saved, err));
-    if (saved != own)
+    uint64_t own[CHECKPOINT_DATA_HASHES], saved[CHECKPOINT_DATA_HASHES];
+    checkpoint_hash_data(t, own);
+    memcpy(saved, own, sizeof saved);
+    for (int i = 0; i < CHECKPOINT_DATA_HASHES; i++)
+        if (container_section_named(c, data_hashes[i].section) != NULL)
+            GBT_TRY(container_get(c, data_hashes[i].section, CONTAINER_U64, 1, &saved[i], err));
+    const char *other = checkpoint_data_difference(own, saved);
+    if (other != NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (%.1000s has %s)", path,
                          t->scene.folder, other);
     return GBT_OK;
@@ -290,13 +343,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
                          (unsigned long long)counters[6],
                          t->scene.photos_missing > 0 ? "; photos that are missing: " : "",
                          t->scene.missing_names);
-    GBT_TRY(
-        check_hash(t, c, path, "views", hash_of_views(t), "photos of other names, sizes or cameras", err));
-    GBT_TRY(check_hash(t, c, path, "geometry", hash_of_geometry(t),
-                       "photos with other lenses or directions, or other sparse points", err));
-    GBT_TRY(check_hash(t, c, path, "photos", t->photos_hash, "photos of the same names, but other pictures",
-                       err));
-    GBT_TRY(check_hash(t, c, path, "masks", t->masks_hash, "other masks", err));
+    GBT_TRY(check_data(t, c, path, err));
     if (counters[4] > PACE_SEGMENTS)
         return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path,
                          (unsigned long long)counters[4], PACE_SEGMENTS);

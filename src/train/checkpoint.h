@@ -9,6 +9,14 @@
    name has another one. Likewise of all masks. GBT_ERR_IO: one cannot be read. */
 gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t *of_masks, gbt_error *err);
 
+/** All that tells the data of a run from other data. */
+enum { CHECKPOINT_DATA_HASHES = 6 };
+void checkpoint_hash_data(const trainer *t, uint64_t out[CHECKPOINT_DATA_HASHES]);
+
+/** What the first of them that differs is of, such as "other masks"; NULL: none does. */
+const char *checkpoint_data_difference(const uint64_t a[CHECKPOINT_DATA_HASHES],
+                                       const uint64_t b[CHECKPOINT_DATA_HASHES]);
+
 /** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev, and at PATH until the
     new one is whole. */
 gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err);

@@ -161,17 +161,27 @@ static gbt_status end_failed(const trainer *t, const run_paths *paths, save_besi
     return base_fail(err, status, "%s", why->text);
 }
 
+/* Wait for a save beside the steps. One that failed may not fail again: all is saved as it is now. */
+static gbt_status end_saving(const trainer *t, const run_paths *paths, save_beside *saving, gbt_error *err)
+{
+    gbt_error why = {0};
+    if (save_finish(saving, &why) == GBT_OK)
+        return GBT_OK;
+    log_warn("%s; saving once more", why.text);
+    return save_all(t, paths, err);
+}
+
 /* Log, evaluate, save, stop: whatever is due after a step. */
 static gbt_status follow_step(trainer *t, const step_report *report, run_clock *c, const run_paths *paths,
                               run_log *log, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
     if (!report->skipped)
-        budget_follow(&c->measured, &t->rules, report, pace_progress(&t->pace, t->step - 1));
+        budget_follow(&c->measured, t, t->step - 1, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
     if (!save_is_under_way(c->saving))
-        GBT_TRY(save_finish(c->saving, err));
+        GBT_TRY(end_saving(t, paths, c->saving, err));
     GBT_TRY(check_memory(t, paths, err));
 
     bool stop = stop_signal_seen();
@@ -189,7 +199,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);
     if (stop || due) {
-        GBT_TRY(save_finish(c->saving, err));
+        GBT_TRY(end_saving(t, paths, c->saving, err));
         const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
         GBT_TRY(at_once ? save_all(t, paths, err) : save_begin(c->saving, t, paths, err));
         c->last_save = t->seconds;
@@ -239,9 +249,28 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
         GBT_TRY(trainer_open(t, data, def, err));
     for (size_t i = 0; i < t->view_count; i++) /* there, too, 0 is no limit */
         t->views[i].frame.scene.tape_bytes_max = def->memory / 8 / t->view_count;
-    if (t->step == 0)
-        t->seconds = clock_wall() - begin; /* loading counts */
+    if (t->step > 0)
+        return GBT_OK;
+    t->seconds = clock_wall() - begin; /* loading counts */
+    if (t->pace.known < PACE_SEGMENTS && t->seconds > t->def.budget_seconds / 2)
+        log_warn("budget: reading the data took %.3g of %.3g s (wanted at least %.3g)", t->seconds,
+                 t->def.budget_seconds, 2 * t->seconds);
     return GBT_OK;
+}
+
+/* Each process has read the data by itself. */
+static gbt_status check_same_data(const trainer *t, gbt_error *err)
+{
+    uint64_t own[CHECKPOINT_DATA_HASHES], first[CHECKPOINT_DATA_HASHES];
+    checkpoint_hash_data(t, own);
+    memcpy(first, own, sizeof first);
+    cluster_broadcast(first, sizeof first);
+    const char *other = checkpoint_data_difference(own, first);
+    const gbt_status status =
+        other == NULL ? GBT_OK
+                      : base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
+                                  gbt_cluster_rank(), t->scene.folder, other);
+    return cluster_agree(status, err);
 }
 
 static gbt_status write_settings(const trainer *t, const char *run, const run_paths *paths, gbt_error *err)
@@ -261,7 +290,7 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
-    GBT_TRY(save_finish(saving, err));
+    GBT_TRY(end_saving(t, paths, saving, err));
     GBT_TRY(save_all(t, paths, err));
     if (log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step))
         GBT_TRY(run_log_summary(log, t, paths->json, err));
@@ -275,20 +304,37 @@ static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving
                : GBT_OK;
 }
 
+static bool holds_run(const run_paths *paths)
+{
+    return file_exists(paths->checkpoint) || file_exists(paths->checkpoint_previous) ||
+           file_exists(paths->model);
+}
+
+/* What a run has in its folder before its first step. */
+static gbt_status begin_files(const trainer *t, const char *run, const run_paths *paths,
+                              const gbt_train_def *def, const config_strings *strings, gbt_error *err)
+{
+    if (def->overwrite && holds_run(paths))
+        GBT_TRY(old_run_remove(run, err));
+    /* data_places says where the data are that checkpoint and model name: no others, should this run end
+       before it has saved. */
+    if (def->resume && strcmp(strings->data, t->scene.folder) != 0)
+        GBT_TRY(save_all(t, paths, err));
+    return write_settings(t, run, paths, err);
+}
+
 /* Files and words are the first process's. */
 static gbt_status run_in_folder(trainer *t, const char *data, const char *run, const run_paths *paths,
                                 const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     GBT_TRY(cluster_agree(open_trainer(t, data, run, paths, def, strings, err), err));
+    GBT_TRY(check_same_data(t, err));
     run_log log = {0};
     gbt_status status = GBT_OK;
     save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
     GBT_TRY(cluster_agree(saving != NULL ? GBT_OK : GBT_ERR_NO_MEMORY, err));
     if (cluster_leads()) {
-        if (def->overwrite)
-            status = old_run_remove(run, err);
-        if (status == GBT_OK)
-            status = write_settings(t, run, paths, err);
+        status = begin_files(t, run, paths, def, strings, err);
         if (status == GBT_OK)
             status = run_log_open(&log, t, paths->log, paths->events, err);
     }

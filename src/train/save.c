@@ -77,12 +77,15 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
 
 gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
 {
-    GBT_TRY(checkpoint_save(t, paths->checkpoint, err));
+    gbt_status status[4] = {checkpoint_save(t, paths->checkpoint, err)};
     if (t->exposures.count > 0)
-        GBT_TRY(save_exposures(t, paths->exposure, err));
+        status[1] = save_exposures(t, paths->exposure, err);
     if (t->poses.count > 0)
-        GBT_TRY(pose_file_write(&t->scene, t->poses.held_out_aligned, paths->poses, err));
-    return save_model(t, paths->model, err);
+        status[2] = pose_file_write(&t->scene, t->poses.held_out_aligned, paths->poses, err);
+    status[3] = save_model(t, paths->model, err);
+    for (int i = 0; i < 4; i++)
+        GBT_TRY(status[i]);
+    return GBT_OK;
 }
 
 /* ---- beside the steps ---- */
@@ -180,6 +183,7 @@ static gbt_status copy_trainer(const trainer *t, trainer *copy, void **memory, g
 static void write_copy(void *context)
 {
     save_beside *s = context;
+    s->error = (gbt_error){0};
     s->status = save_all(&s->copy, s->paths, &s->error);
 }
 

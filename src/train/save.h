@@ -14,7 +14,8 @@ typedef struct run_paths {
         checkpoint_previous[RUN_PATH_SIZE];
 } run_paths;
 
-/** Write all of them. */
+/** Write all of them, also those after one that cannot be written: the checkpoint is 20 times as large as the
+    model. The first failure. */
 gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A save that is written while steps go on: of a copy of all that changes. Start from {0}. */

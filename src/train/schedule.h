@@ -42,6 +42,9 @@ double pace_progress(const pace *p, uint64_t step);
  */
 double pace_expected(const pace *p, uint64_t step);
 
+/** Where time decides on the pace, what pace_expected() says before is up to twice of what comes. */
+#define SCHEDULE_LENGTH_KNOWN 0.25
+
 /** The part that `step` lies in, or p->known when the known parts are used up. */
 int pace_segment(const pace *p, uint64_t step);
 

@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "train/align.h"
 #include "train/growing.h"
@@ -196,13 +197,14 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1),
                  views = t->def.views, steps = views * pace_expected(&t->pace, t->step);
-    const bool learns = t->rules.last_step_learns || next < 1;
+    const bool learns = t->rules.last_step_learns || next < 1,
+               by_time = t->def.iterations == 0 || t->def.pace != NULL;
+    const double looks = steps / t->photo_steps * (by_time && progress < SCHEDULE_LENGTH_KNOWN ? 0.5 : 1);
     const learning_rates rates = learning_rates_at(
         train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->rules.geometry_from,
         t->extent, t->def.learning_rate_factor * sqrt(views), schedule_rate_end(steps), t->def.views);
-    t->left_out = t->rules.leaves_out && train_rules_are_loose(&t->rules, progress)
-                      ? schedule_left_out(steps / t->photo_steps)
-                      : 0;
+    t->left_out =
+        t->rules.leaves_out && train_rules_are_loose(&t->rules, progress) ? schedule_left_out(looks) : 0;
 
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));
@@ -246,15 +248,17 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 
 gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
 {
-    if (t->poses.count > 0)
-        GBT_TRY(align_held_out(t, err));
+    gbt_status status = t->poses.count > 0 ? align_held_out(t, err) : GBT_OK;
     double sum = 0;
     size_t count = 0;
     image photo = {0};
-    gbt_status status = GBT_OK;
     for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
         if (!t->scene.views[i].is_test)
             continue;
+        if (stop_signal_seen()) {
+            status = base_fail(err, GBT_ERR_INTERRUPTED, "stopped while held-out photos were scored");
+            break;
+        }
         unsigned char *marks = NULL;
         const unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
@@ -275,6 +279,9 @@ gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         image_free(&photo);
         mem_free(marks);
     }
+    for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* files are to have no other */
+        if (t->scene.views[i].is_test)
+            t->scene.views[i].camera = t->poses.given[i];
     *psnr = count > 0 ? sum / (double)count : (double)NAN;
     return status;
 }

@@ -61,6 +61,11 @@ on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd / ;; esac; exec "$@
 code=$?
 [ $code = 4 ] && [ "$(errors)" = 1 ] && [ ! -e lost/model.gbt ]
 report $? "data that one process does not find" "code $code: $(cat out err)"
+mkdir other && cp -r data other && cp data/images/0001.png other/data/images/0002.png
+on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd other ;; esac; exec "$@"' sh "$program" train data -o "$work/differs" --views 2 --iterations 30 >out 2>err
+code=$?
+[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 reads other data (data has photos of the same names, but other pictures)$' err && [ ! -e differs/config ]
+report $? "data that differ" "code $code: $(cat out err)"
 on 2 "$program" train data -o "$work/killed" --views 2 --iterations 1000000 --save-every 1s --quiet >out 2>err &
 started=$!
 while [ ! -e killed/checkpoints/last.gbt ] && kill -0 $started; do sleep 0.1; done 2>/dev/null

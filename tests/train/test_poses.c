@@ -162,6 +162,26 @@ static void a_run_goes_on_with_its_poses(void **state)
     }
 }
 
+/* What is saved on the way says that held-out photos are not aligned. */
+static void scoring_leaves_no_pose_behind(void **state)
+{
+    (void)state;
+    trainer t;
+    step_report report;
+    double psnr;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    open_ok(&t, tiny, &def);
+    for (int i = 0; i < STEPS / 2; i++)
+        step_ok(&t, &report);
+    assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+    assert_true(isfinite(psnr) && t.test_count > 0);
+    for (size_t i = 0; i < t.scene.view_count; i++)
+        assert_true(t.scene.views[i].is_test ==
+                    (memcmp(&t.scene.views[i].camera, &t.poses.given[i], sizeof(gbt_camera)) == 0));
+    trainer_free(&t);
+}
+
 /* A signal as soon as the run has been summed up, which is when held-out photos are aligned. */
 static void *signal_at_summary(void *path)
 {
@@ -270,6 +290,7 @@ int main(void)
         cmocka_unit_test(the_mean_stays),
         cmocka_unit_test(disturbed_poses_come_back),
         cmocka_unit_test(a_run_goes_on_with_its_poses),
+        cmocka_unit_test(scoring_leaves_no_pose_behind),
         cmocka_unit_test(held_out_photos_are_aligned_after_a_signal),
         cmocka_unit_test(whoever_opens_the_run_has_them),
         cmocka_unit_test(what_is_no_pose_is_refused),

@@ -7,8 +7,10 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "io/container.h"
 #include "io/model_file.h"
 #include "quiet.h"
+#include "train/checkpoint.h"
 #include "train/config.h"
 #include "write_text.h"
 
@@ -197,6 +199,80 @@ static void other_data_are_refused(void **state)
     train_fails(tiny, in_root("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
 }
 
+/* The sections of a container, but those of these names, as an older version wrote it. */
+static void copy_without(const char *from, const char *to, const char *name, const char *other)
+{
+    container c;
+    container_writer w = {0};
+    assert_ok(container_load(from, &c, NULL));
+    for (size_t i = 0; i < c.count; i++) {
+        const container_section *s = &c.sections[i];
+        if (strcmp(s->name, name) != 0 && strcmp(s->name, other) != 0)
+            container_add(&w, s->name, s->dtype, s->dim_count, s->dims, s->data);
+    }
+    assert_int_equal(w.count + 2, c.count);
+    assert_ok(container_save(&w, to, NULL));
+    container_writer_free(&w);
+    container_free(&c);
+}
+
+static void refuses_checkpoint(trainer *t, const char *path, const char *says)
+{
+    gbt_error err = {0};
+    assert_int_equal(checkpoint_load(t, path, &err), GBT_ERR_FORMAT);
+    if (strstr(err.text, says) == NULL)
+        fail_msg("wanted \"%s\", got: %s", says, err.text);
+}
+
+static void other_splits_and_points_are_refused(void **state)
+{
+    (void)state;
+    trainer t;
+    const gbt_train_def def = run_def();
+    char path[PATH_SIZE], old[PATH_SIZE];
+    snprintf(path, sizeof path, "%s", in_root("data.gbt"));
+    snprintf(old, sizeof old, "%s", in_root("old data.gbt"));
+    open_ok(&t, tiny, &def);
+    assert_ok(checkpoint_save(&t, path, NULL));
+    copy_without(path, old, "split", "points");
+    scene_view *view = &t.scene.views[1];
+    float *color = &t.scene.points.color[4];
+    view->is_test = !view->is_test;
+    refuses_checkpoint(&t, path, "other photos held out");
+    assert_ok(checkpoint_load(&t, old, NULL));
+    view->is_test = !view->is_test;
+    const float own_color = *color;
+    *color = 1 - own_color;
+    refuses_checkpoint(&t, path, "other colours or tracks of the sparse points");
+    assert_ok(checkpoint_load(&t, old, NULL));
+    *color = own_color;
+    view->nearest += 1;
+    refuses_checkpoint(&t, path, "other colours or tracks of the sparse points");
+    assert_ok(checkpoint_load(&t, old, NULL));
+    view->nearest -= 1;
+    assert_ok(checkpoint_load(&t, path, NULL));
+    trainer_free(&t);
+}
+
+/* Run and data go elsewhere together, and the run that goes on there ends before it has saved: here, because
+   log.csv cannot be written. */
+static void a_run_that_was_moved_keeps_its_data(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def(), on = resume_def(0, 0);
+    make_tiny_scene(in_root("before/data"));
+    def.stop_at_step = 5;
+    train_fails(in_root("before/data"), in_root("before/run"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    assert_int_equal(rename(in_root("before"), in_root("behind")), 0);
+    assert_int_equal(rename(in_root("behind/run/log.csv"), in_root("behind/aside")), 0);
+    assert_ok(file_make_folder(in_root("behind/run/log.csv"), NULL));
+    train_fails(NULL, in_root("behind/run"), &on, GBT_ERR_IO, "log.csv");
+    assert_int_equal(rmdir(in_root("behind/run/log.csv")), 0);
+    assert_int_equal(rename(in_root("behind/aside"), in_root("behind/run/log.csv")), 0);
+    train_ok(NULL, in_root("behind/run"), &on);
+    assert_true(number_of(in_root("behind/run"), "iterations") == STEPS);
+}
+
 /* Its colours are learned, are in the model, and have their moments in a checkpoint. */
 static void a_learned_sky_goes_on(void **state)
 {
@@ -225,6 +301,40 @@ static void keep_warnings(const gbt_event *event, void *context)
     char *kept = context;
     if (event->kind == GBT_EVENT_WARNING)
         snprintf(kept + strlen(kept), PATH_SIZE - strlen(kept), "%s\n", event->text);
+}
+
+/* With both, the pace is what counts; also when the run is gone on with by the same options. */
+static void a_pace_wins_over_a_budget(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.iterations = 0;
+    def.budget_seconds = 1e-3;
+    def.pace = "3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3";
+    train_ok(tiny, in_root("by pace"), &def);
+    def.stop_at_step = 30;
+    train_fails(tiny, in_root("by pace in two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    gbt_train_def on = resume_def(0, def.budget_seconds);
+    on.pace = def.pace;
+    train_ok(tiny, in_root("by pace in two"), &on);
+    assert_same_file(in_root("by pace/model.gbt"), in_root("by pace in two/model.gbt"));
+}
+
+static void a_budget_that_reading_takes_is_told(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    char warnings[PATH_SIZE] = "";
+    gbt_listen(keep_warnings, warnings);
+    train_ok(tiny, in_root("enough"), &def);
+    assert_string_equal(warnings, "");
+    def.iterations = 0;
+    def.budget_seconds = 1e-4;
+    train_ok(tiny, in_root("too little"), &def);
+    be_quiet();
+    if (strncmp(warnings, "budget: reading the data took ", 30) != 0 ||
+        strstr(warnings, " of 0.0001 s (wanted at least ") == NULL)
+        fail_msg("%s", warnings);
 }
 
 /* Neither is in the file of a run that left it alone. */
@@ -314,6 +424,12 @@ static void an_overwritten_run_is_gone(void **state)
         assert_false(file_exists(in_root("lost/%s", old[i])));
     assert_true(file_exists(in_root("lost/notes.txt")));
     train_fails(tiny, in_root("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+    /* Where there was no run, files of such names are somebody else's. */
+    write_text(in_root("lost/report.html"), "mine");
+    write_text(in_root("lost/renders/test/0.png"), "mine");
+    assert_int_equal(rmdir(in_root("lost/log.csv")), 0);
+    train_ok(tiny, in_root("lost"), &def);
+    assert_true(file_exists(in_root("lost/report.html")) && file_exists(in_root("lost/renders/test/0.png")));
 }
 
 int main(void)
@@ -327,6 +443,10 @@ int main(void)
         cmocka_unit_test(nothing_left_changes_nothing),
         cmocka_unit_test(the_run_knows_its_data),
         cmocka_unit_test(other_data_are_refused),
+        cmocka_unit_test(other_splits_and_points_are_refused),
+        cmocka_unit_test(a_run_that_was_moved_keeps_its_data),
+        cmocka_unit_test(a_pace_wins_over_a_budget),
+        cmocka_unit_test(a_budget_that_reading_takes_is_told),
         cmocka_unit_test(a_learned_sky_goes_on),
         cmocka_unit_test(what_a_run_left_alone_stays),
         cmocka_unit_test(an_overwritten_run_is_gone),

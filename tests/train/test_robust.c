@@ -8,6 +8,7 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "base/stop_signal.h"
 #include "data/colmap_write.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
@@ -1064,6 +1065,25 @@ static void scoring_stops_at_a_signal(void **state)
     assert_true(file_exists(joined(run, "metrics.json")));
 }
 
+static void scoring_in_passing_stops_at_a_signal(void **state)
+{
+    (void)state;
+    trainer t;
+    const gbt_train_def def = run_def();
+    double psnr;
+    gbt_error err = {0};
+    open_ok(&t, tiny, &def);
+    stop_signal_catch();
+    raise(SIGTERM);
+    const gbt_status status = trainer_held_out_psnr(&t, &psnr, &err);
+    stop_signal_release();
+    assert_int_equal(status, GBT_ERR_INTERRUPTED);
+    assert_string_equal(err.text, "stopped while held-out photos were scored");
+    assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+    assert_true(isfinite(psnr));
+    trainer_free(&t);
+}
+
 int main(void)
 {
     be_quiet();
@@ -1094,6 +1114,7 @@ int main(void)
         cmocka_unit_test(making_small_stops_at_a_signal),
         cmocka_unit_test(a_far_anchor_does_not_move_the_others),
         cmocka_unit_test(scoring_stops_at_a_signal),
+        cmocka_unit_test(scoring_in_passing_stops_at_a_signal),
     };
     return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);
 }

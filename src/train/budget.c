@@ -6,9 +6,6 @@
 
 #include "train/step_size.h"
 
-/* In the part in which growth begins a step takes 1 to 3.6 times what it took before, in the middle 2. */
-static const double growth_factor = 2;
-
 /* What the time of pixels grows with: of a finer picture a pixel costs less, for those beside it see the same
    Gaussians. Four times as many took 1.2 to 2.7 times as long, in the middle 2. */
 static double pixel_load(const train_rules *rules, double pixels, double progress)
@@ -52,9 +49,7 @@ void budget_extend(trainer *t, const step_speed *s)
 {
     const int part = t->pace.known;
     const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
-    const double grows_from = fmax(SCHEDULE_ADJUST_FROM, t->rules.geometry_from);
-    const bool begins = t->def.grow && t->rules.grows_at_points && part == lround(grows_from * PACE_SEGMENTS);
-    const double per_step = s->steps > 0 ? expected_step(t, s, part) * (begins ? growth_factor : 1) : 0;
+    const double per_step = s->steps > 0 ? expected_step(t, s, part) : 0;
     /* Before anything has been measured: what the run's steps took before it was resumed, or a few steps, and
        the rest of the first part's time goes to the next. */
     const double steps = per_step > 0  ? seconds / per_step

@@ -95,7 +95,7 @@ float schedule_threshold_factor(double steps)
 
 double schedule_rate_end(double steps) { return fmin(fmax(sqrt(4000 / fmax(steps, 1)), 0.1), 1); }
 
-float schedule_left_out(double looks) { return 0.3f * (float)fmin(fmax((looks - 100) / 200, 0), 1); }
+float schedule_left_out(double looks) { return (float)(1 - pow(100 / fmax(looks, 100), 0.3)); }
 
 /* Progress at which `level` begins. */
 static double level_start(int level, int start_level)

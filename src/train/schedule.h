@@ -74,8 +74,9 @@ double schedule_rate_end(double steps);
 
 /**
  * The part of the anchors in view that each step until SCHEDULE_EXACT_FROM leaves out at random: 0 up to 100
- * `looks` at each photo, then rising, 0.3 from 300 on. Looks are those of the whole run, as far as its length
- * is known (pace_expected()); of photos large enough for n parts every step is 1/n look.
+ * `looks` at each photo, then 1 - (100 / looks)^0.3: 0.28 at 300, 0.5 at 1,000. Looks are those of the whole
+ * run, as far as its length is known (pace_expected()); of photos large enough for n parts every step is 1/n
+ * look.
  *
  * What looks at its photos so often fits them better than it fits the scene. Anchors that cannot count on
  * each other come to stand where all photos want them (docs/training.md).

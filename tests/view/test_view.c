@@ -405,13 +405,6 @@ static void points_lie_behind_their_pixels(void **state)
     close_viewer(&v, SIGINT);
 }
 
-static void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
-    mem_free(b.data);
-}
-
 /* Photos of another data set: masked pixels are transparent, and a camera of too many pixels is drawn smaller
    or not at all. */
 static void masked_and_large_photos(void **state)

@@ -40,27 +40,6 @@ lab_bench_def lab_bench_def_default(void);
  */
 gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err);
 
-typedef struct lab_bench_query_def {
-    uint64_t points;  /* the largest cloud, 10^4 to 10^7; smaller ones are a tenth each. Default 10^6 */
-    uint64_t queries; /* of each cloud, 1 to 10^7. Default 20,000 */
-    bool check; /* first ask as many queries of every kind, and compare with a test of every ball. Default
-                   false */
-} lab_bench_query_def;
-
-lab_bench_query_def lab_bench_query_def_default(void);
-
-/**
- * Nearest neighbours on random, surface and sparse clouds: ours in a batch and one by one, FLANN's exact
- * kd-tree, its approximate ones (up to 10^6 points) at three settings, and brute force (docs/queries.md).
- *
- * Writes query.csv, query.json and query.svg (the chart) into `folder` (NULL: nowhere), and the table as
- * Markdown to `out`. Times are of one core: process CPU time / queries.
- *
- * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_NO_MEMORY
- * Cost: about half a minute for 10^6 points.
- */
-gbt_status lab_bench_query(const lab_bench_query_def *def, const char *folder, FILE *out, gbt_error *err);
-
 typedef struct lab_study_def {
     const char *const *models; /* plain Gaussians, or runs; their names are the last two parts of their
                                   paths, and differ */

@@ -401,21 +401,12 @@ rm -rf study
 prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --model alone/gaussians.splat --camera camera.json --repeats 1
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
-misuse 2 'bench: "tarce" (wanted trace or query; did you mean trace?)' bench tarce --model gaussians.ply
+misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
 misuse 2 "made/sparse: is there, with cameras that stand still (wanted another folder)" make-scene tabletop -o made --lens rolling
-misuse 2 "--points: bad value (wanted a whole number from 10000 to 10000000, got 10)" bench query --points 10
-misuse 2 "--json: not of bench query (of trace)" bench query --points 10000 --json figures.json
-misuse 2 "--output: not of bench trace (of query)" bench trace --model gaussians.ply -o figures
 misuse 2 "--seeds: not of study speed (of paper time anchors)" study speed gaussians.ply -o study --seeds 3
 misuse 2 "--count: not of query within (of nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
 misuse 2 "--skip-test: not with --skip-train" render tiny -o o --skip-train --skip-test
-bench="bench query --points 10000 --queries 2000 --check"
-prints "bench query agrees with brute force" '^| 8 nearest | 2000 | 16000 | 0 |$' $bench -o query
-prints "for rays too" '^| crossed | 2000 | [1-9][0-9]* | 0 |$' $bench
-[ "$(sed -n 's/^random,10000,flann,0,8,[^,]*,[^,]*,\([^,]*\),$/\1/p' query/query.csv)" = 1 ] && grep -q '"pass": true' query/query.json &&
-    grep -q 'brute force' query/query.svg
-report $? "bench query writes its figures; FLANN finds the same" "$(cat query/query.csv)"
 printf '0 0 0 1\n3 4 0 2\n' >balls.txt
 prints "query, a header" '^query,rank,ball,distance,x,y,z,radius$' query nearest balls.txt --at 0,0,1
 prints "query, nearest" '^0,1,1,5,3,4,0,2$' query nearest balls.txt --at 0,0,0 -k 2

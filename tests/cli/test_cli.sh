@@ -435,13 +435,13 @@ awk -F '|' '{ psnr[$2 $3] = $9 } END { half = psnr[" not built  half-precision r
 report $? "study speed rounds the records that are traced" "$(cat out)"
 "$program" study crosscheck alone/gaussians.splat --camera camera.json -o study-splat >out 2>err && [ "$(grep -c '"pass": true' study-splat/crosscheck.json)" -ge 6 ]
 report $? "study of other plain Gaussians" "$(cat err out)"
-[ "$(grep -c '^"halves.ply",' study/speed.csv)" -ge 24 ] && [ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] &&
-    [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] && [ "$(grep -o '>exact</text>' study/speed.html | wc -l)" = 1 ]
+[ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] && [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] &&
+    [ "$(grep -o '>exact</text>' study/speed.svg | wc -l)" = 1 ] && [ "$(ls study | wc -l)" = 3 ]
 report $? "study writes data and charts" "$(ls -l study)"
 "$program" study crosscheck gaussians.ply -o cross >out 2>err
 got=$?
 [ "$got" = 0 ] && [ "$(grep -c '^| [a-z-]* | [0-9.]* | [0-9.e-]* | [0-9.]* | [0-9.e-]* |$' out)" = 5 ] && [ "$(grep -c '"pass": true' cross/crosscheck.json)" = 7 ] &&
-    grep -q 'dilation' cross/crosscheck.md && grep -q '<svg xmlns' cross/crosscheck.svg && grep -q 'data:image/jpeg' cross/crosscheck.html &&
+    grep -q 'dilation' cross/crosscheck.md && grep -q '<svg xmlns' cross/crosscheck.svg &&
     [ -s cross/crosscheck_gaussians.ply_camera.png ] && grep -q '^| .* | >= [0-9]* | .* | yes |$' out && ! grep -q '&' out cross/crosscheck.md
 report $? "study crosscheck: every row within its limit" "  got $got: $(cat err out)"
 

@@ -24,13 +24,6 @@ static const char *knob_name(speed_knob knob)
 
 /* ---- tables ---- */
 
-static void add_error(text *out, const bench_error *e, const char *between)
-{
-    text_number(out, e->psnr, 1);
-    text_add(out, between);
-    text_format(out, "%.2g", e->max);
-}
-
 static void add_tables(const void *of, text *out)
 {
     const speed_study *study = of;
@@ -47,23 +40,17 @@ static void add_tables(const void *of, text *out)
             const speed_row *row = &model->rows[i];
             text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", knob_name(row->knob),
                         row->value, row->picture_us, row->forward_us, row->both_us, row->blended, row->pairs);
-            add_error(out, &row->error, " | ");
-            text_add(out, " | ");
+            text_number(out, row->error.psnr, 1);
+            text_format(out, " | %.2g | ", row->error.max);
             text_number(out, row->photo_psnr, 2);
             text_add(out, " |\n");
-        }
-        for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            text_format(out, "| not built | %s | error only | %s | | | | ", model->ideas[i].name,
-                        model->ideas[i].reason);
-            add_error(out, &model->ideas[i].error, " | ");
-            text_add(out, " | |\n");
         }
     }
 }
 
 static json_t *model_to_json(const speed_model *model)
 {
-    json_t *rows = json_array(), *ideas = json_array();
+    json_t *rows = json_array();
     const double promised = 0.5 / 255,
                  kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
     for (size_t i = 0; i < model->row_count; i++) {
@@ -82,15 +69,11 @@ static json_t *model_to_json(const speed_model *model)
                       "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max,
                       "photo_psnr", isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
     }
-    for (size_t i = 0; i < SPEED_ERRORS; i++)
-        json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason",
-                                               model->ideas[i].reason, "psnr", model->ideas[i].error.psnr,
-                                               "max_error", model->ideas[i].error.max));
     json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value",
                               kept, "pass", kept <= promised);
-    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:[o]}", "model", json_text(model->name), "gaussians",
+    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:[o]}", "model", json_text(model->name), "gaussians",
                      (json_int_t)model->gaussians, "rays", (json_int_t)model->rays, "check_rays",
-                     (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks", check);
+                     (json_int_t)model->check_rays, "settings", rows, "checks", check);
 }
 
 static json_t *data_of(const void *of)
@@ -111,7 +94,6 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
 {
     const speed_model *model = &study->models[m];
     scatter_point points[SPEED_WAYS_MAX];
-    scatter_level levels[SPEED_ERRORS];
     char note[160];
     if (photos)
         snprintf(note, sizeof note, "%zu held-out photos", model->photo_count);
@@ -124,8 +106,6 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
                            .y_unit = photos ? y_photo_unit : y_unit,
                            .points = points,
                            .point_count = model->row_count,
-                           .levels = levels,
-                           .level_count = photos ? 0 : SPEED_ERRORS,
                            .apart = 1u << KNOB_KERNEL | 1u << KNOB_ISA | 1u << KNOB_RENDERER};
     for (int k = 0; k < KNOB_COUNT; k++)
         chart.series[k] = knob_name((speed_knob)k);
@@ -134,8 +114,6 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
         points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr,
                                     r->is_default ? "" : r->value};
     }
-    for (size_t i = 0; i < SPEED_ERRORS; i++)
-        levels[i] = (scatter_level){model->ideas[i].error.psnr, model->ideas[i].name};
     scatter_draw(out, &chart, top);
 }
 

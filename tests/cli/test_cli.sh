@@ -425,14 +425,10 @@ for study in speed crosscheck rate; do
     misuse 2 "study: a/r/E and b/r/E/ would have one name (wanted paths whose last two parts differ)" study $study a/r/E a/q/E b/r/E/ -o study
 done
 misuse 2 "study: two data sets are called made; their runs would share a folder" study time made made -o study
-awk 'NF == 14 { $1 += 0.03 } 1' gaussians.ply >halves.ply # at places that no half-precision number holds
-"$program" study speed halves.ply -o study --repeats 1 >out 2>err
+"$program" study speed gaussians.ply -o study --repeats 1 >out 2>err
 got=$?
 [ "$got" = 0 ] && [ "$(grep -c '^| preset | [a-z]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9.]* | [0-9]* | [0-9.]* | [0-9.e-]* | n/a |$' out)" = 3 ] && cmp -s out study/speed.md
 report $? "study prints its table" "  got $got: $(cat err out)"
-awk -F '|' '{ psnr[$2 $3] = $9 } END { half = psnr[" not built  half-precision records "]
-    exit !(half > 0 && half + 10 <= psnr[" preset  exact "] && half < psnr[" not built  half but for the mean "]) }' out
-report $? "study speed rounds the records that are traced" "$(cat out)"
 "$program" study crosscheck alone/gaussians.splat --camera camera.json -o study-splat >out 2>err && [ "$(grep -c '"pass": true' study-splat/crosscheck.json)" -ge 6 ]
 report $? "study of other plain Gaussians" "$(cat err out)"
 [ "$(grep -c '"knob": ' study/speed.json)" -ge 21 ] && [ "$(grep -c '<svg xmlns' study/speed.svg)" = 1 ] &&

@@ -61,8 +61,8 @@ static const speed_step steps[] = {
 static bool takes_splats(const bench_scene *s)
 {
     bool takes = raster_takes(&s->camera.shot.camera);
-    for (size_t i = 0; s->run != NULL && i < s->run->scene.view_count; i++)
-        takes = takes && raster_takes(&s->run->scene.views[i].camera);
+    for (size_t i = 0; i < s->run.scene.view_count; i++)
+        takes = takes && raster_takes(&s->run.scene.views[i].camera);
     return takes;
 }
 
@@ -127,9 +127,9 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
 static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats,
                                speed_model *out, gbt_error *err)
 {
-    const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
-    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA},
-                                  [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
+    const bench_splat splats[] = {
+        [RASTER_EWA] = {&s->camera.shot.camera, &s->run.frame.gaussians, RASTER_EWA},
+        [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
     bench_way *ways = mem_calloc(out->row_count, sizeof *ways, "ways", err);
     if (ways == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -398,7 +398,10 @@ done
 misuse 2 "gaussians.ply: plain Gaussians, no anchors (wanted a run or its model.gbt)" study rate gaussians.ply -o study
 misuse 2 "gaussians.ply: plain Gaussians, no anchors (wanted a run or its model.gbt)" check-grad gaussians.ply
 rm -rf study
-prints "bench of other plain Gaussians" '^forward, core-us/ray' bench trace --model alone/gaussians.splat --camera camera.json --repeats 1
+"$program" export gaussians.ply alone/gaussians.glb >out 2>err &&
+    "$program" bench trace --model alone/gaussians.glb --camera camera.json --repeats 1 --json glb.json >>out 2>>err &&
+    [ "$(grep -m 1 '"blended_per_ray"' glb.json)" = "$(grep -m 1 '"blended_per_ray"' one.json)" ]
+report $? "bench of the same Gaussians in another format" "$(cat err out glb.json)"
 misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time or anchors; did you mean rate?)' study pace gaussians.ply -o study
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply

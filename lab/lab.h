@@ -40,27 +40,6 @@ lab_bench_def lab_bench_def_default(void);
  */
 gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err);
 
-typedef struct lab_bench_query_def {
-    uint64_t points;  /* the largest cloud, 10^4 to 10^7; smaller ones are a tenth each. Default 10^6 */
-    uint64_t queries; /* of each cloud, 1 to 10^7. Default 20,000 */
-    bool check; /* first ask as many queries of every kind, and compare with a test of every ball. Default
-                   false */
-} lab_bench_query_def;
-
-lab_bench_query_def lab_bench_query_def_default(void);
-
-/**
- * Nearest neighbours on random, surface and sparse clouds: ours in a batch and one by one, FLANN's exact
- * kd-tree, its approximate ones (up to 10^6 points) at three settings, and brute force (docs/queries.md).
- *
- * Writes query.csv, query.json and query.svg (the chart) into `folder` (NULL: nowhere), and the table as
- * Markdown to `out`. Times are of one core: process CPU time / queries.
- *
- * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_NO_MEMORY
- * Cost: about half a minute for 10^6 points.
- */
-gbt_status lab_bench_query(const lab_bench_query_def *def, const char *folder, FILE *out, gbt_error *err);
-
 typedef struct lab_study_def {
     const char *const *models; /* plain Gaussians, or runs; their names are the last two parts of their
                                   paths, and differ */
@@ -76,8 +55,8 @@ lab_study_def lab_study_def_default(void);
  * Speed against accuracy: core-microseconds per ray and the error to the picture without any cut-off, for
  * every setting that trades one for the other (docs/accuracy.md).
  *
- * Writes speed.csv, speed.json, speed.md, speed.svg (the chart) and speed.html (chart and table, one file
- * that loads nothing) into the folder `folder`, and the table as Markdown to `out`.
+ * Writes speed.json, speed.md and speed.svg (the chart) into the folder `folder`, and the table as Markdown
+ * to `out`.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  * Cost: about a minute per model of 10,000 Gaussians and 512 x 512 rays.
@@ -89,7 +68,7 @@ gbt_status lab_study_speed(const lab_study_def *def, const char *folder, FILE *o
  * causes, one change at a time: order, projection, dilation, cut-offs (docs/crosscheck.md).
  *
  * `def` as for lab_study_speed(), without repeats; of a run up to four held-out views, spread over all. A
- * camera with a lens is replaced by its pinhole. Writes crosscheck.json, .md, .svg (chart), .html and one PNG
+ * camera with a lens is replaced by its pinhole. Writes crosscheck.json, .md, .svg (chart) and one PNG
  * of pictures per view into `folder`, the tables to `out`. A row beyond its limit is no failure: it is told
  * in the table.
  *
@@ -105,7 +84,7 @@ gbt_status lab_study_crosscheck(const lab_study_def *def, const char *folder, FI
  *
  * `def->models`: 1 to 6 runs whose data sets are there; the rest of `def` is not used. Each is coded at a
  * ladder of qualities and without loss, read back and scored by its own renderer at its own size. Writes
- * rate.json, .csv, .md and .svg (chart) into `folder`, the tables to `out`. A row beyond its limit is no
+ * rate.json, .md and .svg (chart) into `folder`, the tables to `out`. A row beyond its limit is no
  * failure: it is told in the table.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -174,7 +153,7 @@ lab_runs_def lab_runs_def_default(void);
  * does (with a constant in place of the scale prior as control), growth stopped early, and the depth of the
  * balls (docs/paper.md).
  *
- * Writes paper.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
+ * Writes paper.md, .json and .svg into `folder`, and the tables as Markdown to `out`.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  * Cost: up to 13 runs per scene and seed; a few gigabytes for models.
@@ -186,8 +165,7 @@ gbt_status lab_study_paper(const lab_runs_def *def, const char *folder, FILE *ou
  * are pinholes), which is given five budgets, and what each choice of the default is worth, one left out at a
  * time.
  *
- * Writes time.md, .csv (every mark of every run), .json and .svg into `folder`, and the tables as Markdown to
- * `out`.
+ * Writes time.md, .json and .svg into `folder`, and the tables as Markdown to `out`.
  *
  * @return as lab_study_paper()
  * Cost: about fifteen budgets per scene and seed. Nothing else should run meanwhile.
@@ -199,7 +177,7 @@ gbt_status lab_study_time(const lab_runs_def *def, const char *folder, FILE *out
  * adaptive balls and at as many random points, and with more or less asked of an anchor; anchors, bytes and
  * hits per ray against held-out PSNR, all after the same number of steps.
  *
- * Writes anchors.md, .csv (every run), .json and .svg into `folder`, and the tables as Markdown to `out`.
+ * Writes anchors.md, .json and .svg into `folder`, and the tables as Markdown to `out`.
  *
  * @return as lab_study_paper()
  * Cost: eight runs per scene and seed. What else runs meanwhile changes nothing but the time.

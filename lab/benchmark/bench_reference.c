@@ -99,13 +99,3 @@ bench_error bench_reference_compare(const bench_reference *reference, const imag
                                 reference->rgb[3 * i + c]);
     return bench_error_of(sum.psnr, sum.max, values);
 }
-
-bench_error bench_reference_compare_some(const bench_reference *reference, const double *rgb, size_t stride)
-{
-    bench_error sum = {0, 0};
-    size_t values = 0;
-    for (size_t i = 0; i < ray_image_count(&reference->rays); i += stride)
-        for (size_t c = 0; c < 3; c++, values++)
-            add_error(&sum, rgb[values] - reference->rgb[3 * i + c]);
-    return bench_error_of(sum.psnr, sum.max, values);
-}

@@ -40,7 +40,4 @@ bench_error bench_error_of(double square_sum, double max, size_t values);
 /** Error of a picture of all rays; only the pixels of the reference count. */
 bench_error bench_reference_compare(const bench_reference *reference, const image *rgb);
 
-/** Error of the values [rays][3] of some of the reference's rays: number 0, stride, 2 stride ... */
-bench_error bench_reference_compare_some(const bench_reference *reference, const double *rgb, size_t stride);
-
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_scene.h -- what benchmarks and studies trace: the Gaussians of a .ply or of a run, and the
+/* benchmark/bench_scene.h -- what benchmarks and studies trace: plain Gaussians or those of a run, and the
    rays of one camera. */
 #ifndef LAB_BENCHMARK_BENCH_SCENE_H
 #define LAB_BENCHMARK_BENCH_SCENE_H
@@ -9,25 +9,24 @@
 
 /** Start from {0}; free with bench_scene_close() after success or failure. Not to be copied. */
 typedef struct bench_scene {
-    const gaussians *gaussians; /* in `from_ply` or in `run`; after bench_scene_decode() */
+    const gaussians *gaussians; /* in `run`; after bench_scene_decode() */
     trace_settings settings;    /* the model's own, or the caller's; read by bench_scene_decode() */
     ray_image rays;
     camera_file camera;
-    struct gaussians from_ply;
-    loaded_run *run; /* NULL for a .ply */
+    loaded_run run;
 } bench_scene;
 
 /**
  * Open a model and find its camera.
  *
- * @param path   [in] plain Gaussians (.ply: the colours of degree 0), or a run
+ * @param path   [in] a file of plain Gaussians, which are traced with thin rays, or a run
  * @param camera [in] camera file, of an aperture the first sample; NULL: the run's first held-out view
  * @return GBT_OK, GBT_ERR_ARGUMENT (plain Gaussians without a camera), GBT_ERR_IO, GBT_ERR_FORMAT,
  *         GBT_ERR_NO_MEMORY
  */
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err);
 
-/** The Gaussians (of a run: those that can be seen with s->settings) and the rays. */
+/** The Gaussians that can be seen with s->settings, and the rays. */
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err);
 
 void bench_scene_close(bench_scene *s);

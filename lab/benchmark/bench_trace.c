@@ -213,9 +213,7 @@ static gbt_status bench(measured *m, bench_scene *traced, bench_reference *want,
         else
             m->ways[k].kernel = m->kernel[k] == BENCH_PACKET_ORDER ? TRACE_LIST : (trace_kernel)m->kernel[k];
     }
-    m->splat =
-        (bench_splat){&traced->camera.shot.camera,
-                      traced->run != NULL ? &traced->run->frame.gaussians : traced->gaussians, RASTER_EWA};
+    m->splat = (bench_splat){&traced->camera.shot.camera, &traced->run.frame.gaussians, RASTER_EWA};
     GBT_TRY(bench_measure(m->ways, m->count, traced->gaussians, &traced->rays, def->repeats, err));
     if (def->check)
         GBT_TRY(check(m, traced, want, err));

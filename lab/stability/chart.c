@@ -113,7 +113,7 @@ static void draw_panel(text *out, const stability_chart *c, int left, int top)
 void stability_draw_charts(const stability_study *study, text *out)
 {
     const int rows = study->chart_count > 0 ? (int)(study->chart_count + ACROSS - 1) / ACROSS : 1;
-    plot_begin(out, "stability", css, "", ACROSS * WIDTH, rows * HEIGHT, false);
+    plot_begin(out, "stability", css, "", ACROSS * WIDTH, rows * HEIGHT);
     for (size_t i = 0; i < study->chart_count; i++)
         draw_panel(out, &study->charts[i], (int)(i % ACROSS) * WIDTH, (int)(i / ACROSS) * HEIGHT);
     text_add(out, "</svg>\n");

@@ -112,26 +112,7 @@ static void add_tables(const void *study, text *out)
     }
 }
 
-/* ---- CSV, JSON ---- */
-
-static void add_csv(const void *study, text *out)
-{
-    const grid_study *s = study;
-    text_add(out, "scene,start,seed");
-    for (int f = 0; f < FIGURES; f++)
-        text_format(out, ",%s", figure_texts[f].name);
-    text_add(out, ",iterations,train_seconds\n");
-    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
-        for (size_t v = 0; v < anchors_variant_count; v++)
-            for (int seed = 0; seed < s->grid.seeds; seed++) {
-                const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
-                stat_csv_text(out, s->grid.names[scene]);
-                text_format(out, ",\"%s\",%d", anchors_variants[v].name, seed);
-                for (int f = 0; f < FIGURES; f++)
-                    text_format(out, ",%.9g", value_of(run, (figure)f));
-                text_format(out, ",%.0f,%.6g\n", run->iterations, run->train_seconds);
-            }
-}
+/* ---- JSON ---- */
 
 static void add_limited(json_t *rows, const char *scene, const char *start, const char *what, double value,
                         double limit)
@@ -207,11 +188,11 @@ static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
 static void add_charts(const void *study, text *out)
 {
     const grid_study *s = study;
-    scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
+    scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");
 }
 
 const study_output anchors_output = {
-    .name = "anchors", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};
+    .name = "anchors", .tables = add_tables, .charts = add_charts, .data = data_of};

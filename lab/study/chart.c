@@ -9,14 +9,15 @@
 
 enum { LEFT = 54, RIGHT = 738, TOP = 84, BOTTOM = 450, BOXES_MAX = 256 };
 
-const char scatter_css[] = ".plot .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
-                           ".plot .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
-                           ".plot .label,.plot "
-                           ".level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:"
-                           "3px;stroke-linejoin:round}\n"
-                           ".plot .label{fill:var(--k)}.plot .label.s0{font-size:14px;font-weight:700}\n"
-                           ".plot .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.plot "
-                           ".level-label{font-style:italic}\n";
+static const char scatter_css[] =
+    ".plot .join{fill:none;stroke:var(--k);stroke-width:1.5;opacity:.45}\n"
+    ".plot .mark{fill:var(--k);stroke:var(--page);stroke-width:1.5}\n"
+    ".plot .label,.plot "
+    ".level-label{font-size:11px;paint-order:stroke;stroke:var(--page);stroke-width:"
+    "3px;stroke-linejoin:round}\n"
+    ".plot .label{fill:var(--k)}.plot .label.s0{font-size:14px;font-weight:700}\n"
+    ".plot .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.plot "
+    ".level-label{font-style:italic}\n";
 
 /* ---- room ---- */
 
@@ -187,9 +188,9 @@ static void draw_levels(text *out, const scatter_chart *c, plane *p)
     }
 }
 
-void scatter_begin(text *out, const char *label, const char *css, int height, bool in_page)
+void scatter_begin(text *out, const char *label, const char *css, int height)
 {
-    plot_begin(out, label, scatter_css, css, SCATTER_WIDTH, height, in_page);
+    plot_begin(out, label, scatter_css, css, SCATTER_WIDTH, height);
 }
 
 void scatter_draw(text *out, const scatter_chart *c, int top)

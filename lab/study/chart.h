@@ -34,11 +34,9 @@ typedef struct scatter_chart {
     size_t level_count;
 } scatter_chart;
 
-/** Rules for what scatter_draw() adds to a plot (report/plot.h). */
-extern const char scatter_css[];
-
-/** An SVG of scatter charts begins: plot_begin() with their rules. `css`: further rules, or "". */
-void scatter_begin(text *out, const char *label, const char *css, int height, bool in_page);
+/** An SVG of scatter charts begins: plot_begin() with the rules of what scatter_draw() adds. `css`: further
+ * rules, or "". */
+void scatter_begin(text *out, const char *label, const char *css, int height);
 
 /**
  * The chart as an SVG group, SCATTER_WIDTH x SCATTER_HEIGHT, its upper left corner at (0, top). Log x from

@@ -37,7 +37,7 @@ static raster_settings settings_of_step(const trace_settings *s, cross_step step
 /* Dilation stands in the place of the footprint that a run has given its Gaussians. */
 static const gaussians *gaussians_of_step(const bench_scene *s, cross_step step)
 {
-    return s->run != NULL && step >= CROSS_DILATION ? &s->run->frame.gaussians : s->gaussians;
+    return step >= CROSS_DILATION ? &s->run.frame.gaussians : s->gaussians;
 }
 
 static gbt_status trace_picture(const bench_scene *s, const trace_settings *settings, image *out,
@@ -279,7 +279,7 @@ static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char 
 /* Held-out views, spread over all of them; all views when none is held out. */
 static gbt_status measure_run(bench_scene *s, const char *folder, cross_model *out, gbt_error *err)
 {
-    const loaded_run *run = s->run;
+    const loaded_run *run = &s->run;
     size_t held_out = 0, seen = 0;
     for (size_t i = 0; i < run->scene.view_count; i++)
         held_out += run->scene.views[i].is_test;

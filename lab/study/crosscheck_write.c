@@ -1,16 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, as a chart and as a
-   page. */
+/* study/crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, and as a chart. */
 #include <jansson.h>
 #include <math.h>
-#include <stdint.h>
 
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
-#include "report/image.h"
 #include "report/plot.h"
-#include "report/style.h"
 #include "study/crosscheck.h"
 
 enum {
@@ -190,12 +184,13 @@ static void draw_bars(const cross_model *model, const cross_view *v, int top, te
     }
 }
 
-static void add_svg(const cross_study *study, bool alone, text *out)
+static void add_charts(const void *of, text *out)
 {
+    const cross_study *study = of;
     int height = HEAD, top = HEAD;
     for (size_t m = 0; m < study->model_count; m++)
         height += (int)study->models[m].view_count * view_height();
-    plot_begin(out, "from tracer to splats", bar_css, "", PICTURE_WIDTH, height, !alone);
+    plot_begin(out, "from tracer to splats", bar_css, "", PICTURE_WIDTH, height);
     text_add(out, "<text class=\"title\" x=\"8\" y=\"22\">From tracer to splats, one change at a time</text>"
                   "<text x=\"8\" y=\"42\">PSNR in dB, longer is closer: the bar to the step before, the mark "
                   "to the tracer</text>");
@@ -205,62 +200,5 @@ static void add_svg(const cross_study *study, bool alone, text *out)
     text_add(out, "</svg>\n");
 }
 
-static void add_charts(const void *study, text *out) { add_svg(study, true, out); }
-
-/* ---- page ---- */
-
-static void add_page_view(const cross_model *model, const cross_view *v, const char *folder, text *out)
-{
-    char path[4096];
-    int width = 0, height = 0;
-    text_add(out, "<figure class=\"card panel\"><figcaption><b>");
-    text_escaped(out, model->name);
-    text_add(out, "</b>, ");
-    text_escaped(out, v->name);
-    text_format(out, ": %zu Gaussians%s</figcaption>", v->gaussians,
-                v->stand_in ? "; without the camera's lens" : "");
-    if (file_join(path, sizeof path, folder, v->sheet, out->err) == GBT_OK) {
-        text_add(out, "<img style=\"width:100%;height:auto\" alt=\"tracer, splats and differences\" src=\"");
-        report_picture(out, path, PICTURE_COLOR, SIZE_MAX, &width, &height);
-        text_add(out, "\">");
-    }
-    text_add(out, "<div class=\"scroll\"><table "
-                  "class=\"list\"><thead><tr><th>row</th><th>limit</th><th>value</th><th>pass</th></tr></"
-                  "thead><tbody>");
-    for (size_t i = 0; i < CROSS_CHECKS; i++)
-        text_format(out, "<tr><th>%s</th><td>&ge; %g</td><td>%.5g</td><td>%s</td></tr>", v->checks[i].row,
-                    v->checks[i].limit, v->checks[i].value, passes(&v->checks[i]) ? "yes" : "<b>no</b>");
-    text_add(out, "</tbody></table></div></figure>\n");
-}
-
-static void add_page(const void *of, const char *folder, text *out)
-{
-    const cross_study *study = of;
-    text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-                  "content=\"width=device-width,initial-scale=1\">"
-                  "<title>Tracer against rasterizer</title>\n<style>\n");
-    text_add(out, report_css);
-    text_add(out, plot_css);
-    text_add(out, bar_css);
-    text_add(out, ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n"
-                  "</style></head>\n<body>\n<header><h1>Tracer against rasterizer</h1><p class=\"lead\">From "
-                  "the tracer's picture to that of 3D Gaussian splatting, one change at a time; each keeps "
-                  "those before it.</p></header>\n<main>\n<ul>");
-    for (cross_step step = 0; step < CROSS_STEPS; step++)
-        text_format(out, "<li><b>%s</b>: %s</li>", step_name(step), step_text(step));
-    text_add(out, "</ul>\n<figure class=\"card panel\">");
-    add_svg(study, false, out);
-    text_format(
-        out,
-        "</figure>\n<p>Pictures, from the upper left: tracer, splats, their difference &times; %d, that of "
-        "the tiles &times; %d; order, projection, dilation and cut-offs, each &times; %d.</p>\n",
-        (int)CROSS_AMPLIFIED, (int)CROSS_AMPLIFIED_TILES, (int)CROSS_AMPLIFIED);
-    for (size_t m = 0; m < study->model_count; m++)
-        for (size_t v = 0; v < study->models[m].view_count; v++)
-            add_page_view(&study->models[m], &study->models[m].views[v], folder, out);
-    text_add(out, "</main>\n<footer><p>The two share the cameras and the Gaussians, and no code that draws. "
-                  "This page is one file and loads nothing.</p></footer>\n</body></html>\n");
-}
-
 const study_output cross_output = {
-    .name = "crosscheck", .tables = add_tables, .charts = add_charts, .data = data_of, .page = add_page};
+    .name = "crosscheck", .tables = add_tables, .charts = add_charts, .data = data_of};

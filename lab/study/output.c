@@ -26,13 +26,11 @@ gbt_status study_output_save(const study_output *o, const void *study, const cha
     const struct {
         const char *ending;
         void (*add)(const void *study, text *out);
-    } texts[] = {{"csv", o->csv}, {"svg", o->charts}, {"md", o->tables}};
+    } texts[] = {{"svg", o->charts}, {"md", o->tables}};
     char name[64];
     snprintf(name, sizeof name, "%s.json", o->name);
     GBT_TRY(save_data(o, study, folder, name, err));
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
-        if (texts[i].add == NULL)
-            continue;
         text body = {.err = err};
         texts[i].add(study, &body);
         if (texts[i].add == o->tables && out != NULL && body.status == GBT_OK)
@@ -40,10 +38,5 @@ gbt_status study_output_save(const study_output *o, const void *study, const cha
         snprintf(name, sizeof name, "%s.%s", o->name, texts[i].ending);
         GBT_TRY(text_save(&body, folder, name));
     }
-    if (o->page == NULL)
-        return GBT_OK;
-    text page = {.err = err};
-    o->page(study, folder, &page);
-    snprintf(name, sizeof name, "%s.html", o->name);
-    return text_save(&page, folder, name);
+    return GBT_OK;
 }

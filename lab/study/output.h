@@ -11,12 +11,9 @@
 /** A study by its name, and what is written of it. Functions get the study's own struct. */
 typedef struct study_output {
     const char *name;
-    void (*csv)(const void *study, text *out);    /* NAME.csv; NULL: none */
     void (*tables)(const void *study, text *out); /* NAME.md */
     void (*charts)(const void *study, text *out); /* NAME.svg */
     json_t *(*data)(const void *study);           /* NAME.json: an object; `schema` and `study` are added */
-    /* NAME.html; NULL: none. `folder` has the other files. */
-    void (*page)(const void *study, const char *folder, text *out);
 } study_output;
 
 /** All files of a study into `folder`. `out`: optional (NULL), gets the tables too. */

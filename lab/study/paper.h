@@ -2,7 +2,7 @@
 /* study/paper.h -- what the study "paper" trains, what came out, and how it is written down.
 
    scenes x variants x seeds --> figures
-        --> tables, changes from one variant to another (ours beside the paper's) --> md, csv, json, svg */
+        --> tables, changes from one variant to another (ours beside the paper's) --> md, json, svg */
 #ifndef GBT_STUDY_PAPER_H
 #define GBT_STUDY_PAPER_H
 

@@ -126,7 +126,7 @@ void paper_charts(const void *study, text *out)
     const size_t count = spread_table > 0 ? paper_table_variants(spread_table, &variants) : 0;
     const int spread = spread_table > 0 ? panel_height(count) : 0,
               one = spread + (has_growth ? SCATTER_HEIGHT : 0);
-    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->grid.scene_count, false);
+    scatter_begin(out, "anchors and PSNR by start", css, one * (int)s->grid.scene_count);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++) {
         if (spread_table > 0)
             draw_panel(out, s, scene, variants, count, (int)scene * one);

@@ -1,46 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_data.c -- the study "paper" as data: every run in CSV; rows, changes and runs in JSON. */
+/* study/paper_data.c -- the study "paper" as data: rows, changes and figures in JSON. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "base/choice.h"
-#include "base/fail.h"
-#include "base/file.h"
 #include "data/json_out.h"
 #include "study/paper.h"
 
 /* The balls of real points against the closed form: ties and stopped sets move it. */
 static const double ball_count_limit = 0.015;
-
-/* ---- CSV ---- */
-
-static void add_csv_run(const paper_study *s, size_t scene, paper_variant_id variant, int seed, text *out)
-{
-    const study_figures *r = paper_run(s, scene, variant, seed);
-    stat_csv_text(out, s->grid.names[scene]);
-    text_format(out, ",%s,%d,%.0f,%.0f,%.0f,%.6g,%.0f,%.9g,%.9g,", paper_variants[variant].name, seed,
-                r->points, r->anchors_initial, r->anchors_final, paper_figure_of(r, PAPER_STORAGE),
-                r->model_bytes, r->psnr, r->ssim);
-    text_format(out, "%.6g,%.6g,%.6g,%.0f,%.6g,", r->anchors_in_view, paper_figure_of(r, PAPER_ARITHMETIC),
-                r->blended_per_ray, r->iterations, r->train_seconds);
-    if (paper_is_measured(s, PAPER_LPIPS))
-        text_format(out, "%.9g", r->lpips_01);
-    text_add(out, "\n");
-}
-
-static void add_csv(const void *study, text *out)
-{
-    const paper_study *s = study;
-    text_add(out, "scene,variant,seed,points,anchors_initial,anchors_final,storage_mib,model_bytes,psnr,ssim,"
-                  "anchors_in_view,giga_macs_per_view,blended_per_ray,iterations,train_seconds,lpips_01\n");
-    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
-        for (int v = 0; v < PAPER_VARIANTS; v++)
-            for (int seed = 0; seed < s->grid.seeds && s->has_variant[v]; seed++)
-                add_csv_run(s, scene, (paper_variant_id)v, seed, out);
-}
-
-/* ---- JSON ---- */
 
 /* How far the balls of a scene are from the closed form, for each depth that was trained. */
 static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
@@ -118,4 +86,4 @@ static json_t *data_of(const void *study)
 }
 
 const study_output paper_output = {
-    .name = "paper", .csv = add_csv, .tables = paper_tables, .charts = paper_charts, .data = data_of};
+    .name = "paper", .tables = paper_tables, .charts = paper_charts, .data = data_of};

@@ -2,13 +2,11 @@
 /* study/rate_write.c -- the study "rate" as tables, as data, and as a chart. */
 #include <jansson.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "data/json_out.h"
 #include "gbtrace/compress.h"
 #include "study/chart.h"
 #include "study/rate.h"
-#include "study/runs_stat.h"
 
 /* What a coded model should keep to: a twelfth of a baseline with 1 / 0.7 as many anchors of 316 bytes, and
    what nobody sees. */
@@ -58,25 +56,6 @@ static void add_tables(const void *of, text *out)
             text_add(out, " | ");
             text_number(out, m->ssim - r->ssim, 4);
             text_format(out, " | %.2f | %.2f |\n", r->encode_seconds, r->decode_seconds);
-        }
-    }
-}
-
-static void add_csv(const void *of, text *out)
-{
-    const rate_study *study = of;
-    text_add(out, "model,quality,anchors,bytes,positions,features,offsets,scales,pixels,steps,networks,psnr,"
-                  "ssim,psnr_loss,encode_seconds,decode_seconds\n");
-    for (size_t i = 0; i < study->model_count; i++) {
-        const rate_model *m = &study->models[i];
-        for (size_t j = 0; j < m->row_count; j++) {
-            const rate_row *r = &m->rows[j];
-            const model_sizes *s = &r->sizes;
-            stat_csv_text(out, m->name);
-            text_format(out, ",%g,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%zu,%.6g,%.6g,%.6g,%.6g,%.6g\n", r->quality,
-                        m->anchors, s->total, s->positions, s->features, s->offsets, s->scales, s->pixels,
-                        s->steps, s->networks, r->psnr, r->ssim, m->psnr - r->psnr, r->encode_seconds,
-                        r->decode_seconds);
         }
     }
 }
@@ -158,10 +137,10 @@ static void add_charts(const void *of, text *out)
             chart.point_count++;
         }
     }
-    scatter_begin(out, "size against picture", "", SCATTER_HEIGHT, false);
+    scatter_begin(out, "size against picture", "", SCATTER_HEIGHT);
     scatter_draw(out, &chart, 0);
     text_add(out, "</svg>\n");
 }
 
 const study_output rate_output = {
-    .name = "rate", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};
+    .name = "rate", .tables = add_tables, .charts = add_charts, .data = data_of};

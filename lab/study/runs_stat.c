@@ -66,17 +66,6 @@ void stat_add_judged(text *out, const stat_sample *s, int decimals)
     text_add(out, mark);
 }
 
-void stat_csv_text(text *out, const char *outside)
-{
-    text_add(out, "\"");
-    for (const char *c = outside; *c != '\0'; c++)
-        if (*c == '"')
-            text_add(out, "\"\"");
-        else
-            text_format(out, "%c", *c);
-    text_add(out, "\"");
-}
-
 json_t *stat_to_json(const stat_sample *s)
 {
     return json_pack("{s:o,s:o,s:I}", "mean", json_number(s->mean), "deviation", json_number(s->deviation),

@@ -38,9 +38,6 @@ void stat_add_judged(text *out, const stat_sample *s, int decimals);
 /** "+1.23", "-1.23", "0.00" for what rounds to that; `value` is finite. */
 void stat_add_change(text *out, double value, int decimals);
 
-/** Any text as a quoted field of a CSV file. */
-void stat_csv_text(text *out, const char *outside);
-
 /** {"mean", "deviation", "count"}; null for what is not finite. */
 json_t *stat_to_json(const stat_sample *s);
 

@@ -3,21 +3,16 @@
 #include "study/speed.h"
 
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/sky.h"
 #include "benchmark/bench_scene.h"
 #include "lab/lab.h"
 #include "raster/raster.h"
 #include "study/model.h"
-#include "trace/reference.h"
 
 /* ---- what is tried ---- */
 
@@ -66,8 +61,8 @@ static const speed_step steps[] = {
 static bool takes_splats(const bench_scene *s)
 {
     bool takes = raster_takes(&s->camera.shot.camera);
-    for (size_t i = 0; s->run != NULL && i < s->run->scene.view_count; i++)
-        takes = takes && raster_takes(&s->run->scene.views[i].camera);
+    for (size_t i = 0; i < s->run.scene.view_count; i++)
+        takes = takes && raster_takes(&s->run.scene.views[i].camera);
     return takes;
 }
 
@@ -113,163 +108,6 @@ static void list_rows(const trace_settings *own, bool with_splats, speed_model *
     }
 }
 
-/* ---- ideas that were not built: only what they do to the picture ---- */
-
-enum { ORDER_STRIDE = 4 }; /* rays are slow in double, one by one: every 4th of the reference's */
-
-/* One order for the whole picture, as in 3DGS: by the depth of the mean along the mean direction of the
-   rays. */
-typedef struct order_job {
-    const reference_scene *scene;
-    const trace_settings *settings;
-    const ray_image *rays;
-    double axis[3];
-    double *rgb;
-} order_job;
-
-typedef struct centre_hit {
-    double depth;
-    const reference_hit *hit;
-} centre_hit;
-
-static double field_of(const reference_scene *s, enum reference_field f, size_t i)
-{
-    return s->fields[(size_t)f * s->count + i];
-}
-
-static int by_centre(const void *a, const void *b)
-{
-    const centre_hit *p = a, *q = b;
-    if (p->depth != q->depth)
-        return p->depth < q->depth ? -1 : 1;
-    return p->hit->id < q->hit->id ? -1 : p->hit->id > q->hit->id;
-}
-
-static void blend_by_centre(const order_job *job, const double dir[3], const reference_hit *hits,
-                            size_t count, centre_hit *order, double rgb[3])
-{
-    double T = 1, behind[3];
-    for (size_t i = 0; i < count; i++) {
-        order[i] = (centre_hit){0, &hits[i]};
-        for (unsigned k = 0; k < 3; k++)
-            order[i].depth += job->axis[k] * field_of(job->scene, REFERENCE_mean_x + k, hits[i].id);
-    }
-    qsort(order, count, sizeof *order, by_centre);
-    rgb[0] = rgb[1] = rgb[2] = 0;
-    for (size_t i = 0; i < count; i++) {
-        const double alpha = order[i].hit->alpha, next = T * (1 - alpha);
-        if (next < (double)job->settings->transmittance_min)
-            break;
-        for (unsigned c = 0; c < 3; c++)
-            rgb[c] += T * alpha * field_of(job->scene, REFERENCE_red + c, order[i].hit->id);
-        T = next;
-    }
-    sky_color_exact(&job->settings->sky, job->settings->background, dir, behind);
-    for (int c = 0; c < 3; c++)
-        rgb[c] += T * behind[c];
-}
-
-static void order_block(size_t block, size_t begin, size_t end, void *context)
-{
-    order_job *job = context;
-    reference_hit *hits = NULL;
-    centre_hit *order = NULL;
-    size_t count, capacity = 0, order_capacity = 0;
-    gbt_status status = GBT_OK;
-    (void)block;
-    for (size_t i = begin; i < end && status == GBT_OK; i++) {
-        double origin[3], dir[3];
-        for (size_t k = 0; k < 3; k++) {
-            origin[k] = (double)ray_image_origin(job->rays, i * ORDER_STRIDE)[k];
-            dir[k] = (double)job->rays->dir[3 * i * ORDER_STRIDE + k];
-        }
-        status =
-            reference_scene_ray_hits(job->scene, job->settings, origin, dir, &hits, &count, &capacity, NULL);
-        if (status == GBT_OK)
-            status = mem_reserve((void **)&order, &order_capacity, 0, count + 1, sizeof *order,
-                                 "hits by centre", NULL);
-        if (status == GBT_OK)
-            blend_by_centre(job, dir, hits, count, order, job->rgb + 3 * i);
-    }
-    mem_free(hits);
-    mem_free(order);
-    if (status != GBT_OK)
-        for (size_t i = 3 * begin; i < 3 * end; i++)
-            job->rgb[i] = NAN; /* seen by the caller */
-}
-
-static gbt_status order_by_centre(const gaussians *g, const trace_settings *settings,
-                                  const bench_reference *want, bench_error *out, gbt_error *err)
-{
-    reference_scene exact = {0};
-    const size_t all = ray_image_count(&want->rays), count = (all + ORDER_STRIDE - 1) / ORDER_STRIDE;
-    order_job job = {.scene = &exact, .settings = settings, .rays = &want->rays};
-    for (size_t i = 0; i < all; i++)
-        for (size_t k = 0; k < 3; k++)
-            job.axis[k] += (double)want->rays.dir[3 * i + k];
-    job.rgb = mem_alloc(count, 3 * sizeof *job.rgb, "picture by centre", err);
-    gbt_status status = job.rgb == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(g, &exact, err);
-    if (status == GBT_OK) {
-        parallel_blocks(count, 16, order_block, &job);
-        for (size_t i = 0; i < 3 * count && status == GBT_OK; i++)
-            if (isnan(job.rgb[i]))
-                status = base_fail(err, GBT_ERR_NO_MEMORY, "study: no memory for the hits by centre");
-    }
-    if (status == GBT_OK)
-        *out = bench_reference_compare_some(want, job.rgb, ORDER_STRIDE);
-    reference_scene_free(&exact);
-    mem_free(job.rgb);
-    return status;
-}
-
-/* To the nearest half-precision number, ties to even; what is too large becomes the largest. */
-static float round_to_half(float x)
-{
-    int exponent;
-    frexpf(x, &exponent);
-    const int low = exponent - 11 > -24 ? exponent - 11 : -24; /* the last bit */
-    return fminf(fmaxf(ldexpf(nearbyintf(ldexpf(x, -low)), low), -65504), 65504);
-}
-
-/* Records of half the size: every number rounded to a half, or all but the mean. Through the tree, which
-   reads these records alone: lists make others of the Gaussians. */
-static gbt_status half_records(const bench_scene *s, const trace_settings *settings, bool keep_mean,
-                               const bench_reference *want, bench_error *out, gbt_error *err)
-{
-    trace_scene traced = {.kernel = TRACE_TILE};
-    image rgb = {0};
-    gbt_status status = image_alloc(&rgb, s->rays.width, s->rays.height, 3, err);
-    if (status == GBT_OK)
-        status = trace_build(&traced, s->gaussians, settings, ray_image_reach(&s->rays), err);
-    for (size_t i = 0; status == GBT_OK && i < s->gaussians->count * RECORD_FLOATS; i++) {
-        const size_t at = i % RECORD_FLOATS;
-        if (at < RECORD_COLOR + 3 && !(keep_mean && at >= RECORD_MEAN && at < RECORD_MEAN + 3))
-            traced.records[i] = round_to_half(traced.records[i]);
-    }
-    if (status == GBT_OK)
-        status = trace_forward(&traced, &s->rays, false, &(trace_outputs){.rgb = &rgb}, NULL, err);
-    if (status == GBT_OK)
-        *out = bench_reference_compare(want, &rgb);
-    trace_scene_free(&traced);
-    image_free(&rgb);
-    return status;
-}
-
-/* With the cut-offs of "exact", so that the error is the idea's own. */
-static gbt_status measure_ideas(const bench_scene *s, const trace_settings *settings,
-                                const bench_reference *want, speed_model *out, gbt_error *err)
-{
-    out->ideas[0] = (speed_idea){.name = "order by centre",
-                                 .reason = "wrong order; would save the comparison of pairs of rows at most"};
-    out->ideas[1] = (speed_idea){.name = "half-precision records",
-                                 .reason = "a record is read once per tile: little to save"};
-    out->ideas[2] =
-        (speed_idea){.name = "half but for the mean", .reason = "38 bytes in place of 64: little to save"};
-    GBT_TRY(order_by_centre(s->gaussians, settings, want, &out->ideas[0].error, err));
-    GBT_TRY(half_records(s, settings, false, want, &out->ideas[1].error, err));
-    return half_records(s, settings, true, want, &out->ideas[2].error, err);
-}
-
 /* ---- one model ---- */
 
 static void keep_figures(const bench_scene *s, const bench_way *way, const bench_reference *want,
@@ -289,9 +127,9 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
 static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats,
                                speed_model *out, gbt_error *err)
 {
-    const gaussians *thin = s->run != NULL ? &s->run->frame.gaussians : s->gaussians;
-    const bench_splat splats[] = {[RASTER_EWA] = {&s->camera.shot.camera, thin, RASTER_EWA},
-                                  [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
+    const bench_splat splats[] = {
+        [RASTER_EWA] = {&s->camera.shot.camera, &s->run.frame.gaussians, RASTER_EWA},
+        [RASTER_PER_RAY] = {&s->camera.shot.camera, s->gaussians, RASTER_PER_RAY}};
     bench_way *ways = mem_calloc(out->row_count, sizeof *ways, "ways", err);
     if (ways == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -330,7 +168,6 @@ static gbt_status measure_scene(bench_scene *s, bench_reference *want, const cha
     log_info("%s: %zu Gaussians, %zu rays: the picture in double", out->name, out->gaussians, out->rays);
     GBT_TRY(bench_reference_make(s->gaussians, &whole, &s->rays, want, err));
     out->check_rays = ray_image_count(&want->rays);
-    GBT_TRY(measure_ideas(s, &out->rows[0].settings, want, out, err));
     log_info("%s: timing %zu settings", out->name, out->row_count);
     GBT_TRY(measure_rows(s, want, repeats, out, err));
     return speed_measure_photos(s, out, err);

@@ -9,7 +9,7 @@
 
 struct bench_scene;
 
-enum { SPEED_WAYS_MAX = 29, SPEED_ERRORS = 3, SPEED_MODELS_MAX = 16 };
+enum { SPEED_WAYS_MAX = 29, SPEED_MODELS_MAX = 16 };
 
 typedef enum speed_knob {
     KNOB_PRESET,
@@ -39,20 +39,12 @@ typedef struct speed_row {
     bench_error error;          /* to the picture without cut-offs */
 } speed_row;
 
-/** A change of the program that was not built: what it would do to the picture, and why its speed was not
-    worth it. */
-typedef struct speed_idea {
-    const char *name, *reason;
-    bench_error error; /* with the cut-offs of "exact": nearly all of it is the idea's own */
-} speed_idea;
-
 typedef struct speed_model {
     char name[256];
     size_t gaussians, rays, check_rays;
     speed_row rows[SPEED_WAYS_MAX];
     size_t row_count;
     size_t photo_count; /* held-out photos; 0 for a .ply */
-    speed_idea ideas[SPEED_ERRORS];
 } speed_model;
 
 typedef struct speed_study {

@@ -21,7 +21,7 @@ static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *
         return trace_forward(traced, &s->rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
     }
     const raster_settings splat = frame_splat_settings(&settings, row->form);
-    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run->frame.gaussians : s->gaussians,
+    return raster_forward(splatted, row->form == RASTER_EWA ? &s->run.frame.gaussians : s->gaussians,
                           &s->camera.shot.camera, &splat, false, rgb, NULL, NULL, err);
 }
 
@@ -34,9 +34,9 @@ static bool is_own_picture(const speed_row *row)
 /* As gbtrace eval scores it. A photo that is masked whole counts for no row. */
 static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_error *err)
 {
-    const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
+    const gbt_camera camera = photos_camera(&s->run.photos, view, 0);
     s->camera.shot = ray_shot_of(&camera);
-    s->settings.t_near = loaded_run_settings(s->run, view).t_near;
+    s->settings.t_near = loaded_run_settings(&s->run, view).t_near;
     GBT_TRY(bench_scene_decode(s, err));
     image photo = {0}, copy = {0}, rgb = {0};
     trace_scene traced = {0};
@@ -45,9 +45,9 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
     const unsigned char *valid = NULL;
     bool counts = true;
     gbt_status status =
-        scene_read_photo_valid(&s->run->scene.views[view], camera.width, camera.height, &photo, &marks, err);
+        scene_read_photo_valid(&s->run.scene.views[view], camera.width, camera.height, &photo, &marks, err);
     if (status == GBT_OK)
-        status = frame_valid(&s->run->frame, marks, &valid, err);
+        status = frame_valid(&s->run.frame, marks, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&rgb, camera.width, camera.height, 3, err);
     if (status == GBT_OK)
@@ -60,7 +60,7 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
         if (status != GBT_OK)
             break;
         memcpy(copy.pixels, photo.pixels, 3 * ray_image_count(&s->rays) * sizeof *copy.pixels);
-        status = image_score_photo(&rgb, &copy, valid, s->run->def.exposure, NULL, &scores, err);
+        status = image_score_photo(&rgb, &copy, valid, s->run.def.exposure, NULL, &scores, err);
         counts = isfinite(scores.psnr);
         out->rows[i].photo_psnr += counts ? scores.psnr : 0;
     }
@@ -76,12 +76,12 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
 
 gbt_status speed_measure_photos(bench_scene *s, speed_model *out, gbt_error *err)
 {
-    if (s->run == NULL || s->run->scene.view_count == 0)
+    if (s->run.scene.view_count == 0)
         return GBT_OK;
     for (size_t i = 0; i < out->row_count; i++)
         out->rows[i].photo_psnr = 0;
-    for (size_t view = 0; view < s->run->scene.view_count; view++)
-        if (s->run->scene.views[view].is_test)
+    for (size_t view = 0; view < s->run.scene.view_count; view++)
+        if (s->run.scene.views[view].is_test)
             GBT_TRY(score_view(s, view, out, err));
     for (size_t i = 0; i < out->row_count; i++) /* the second row is the preset "default" */
         out->rows[i].photo_psnr = is_own_picture(&out->rows[i])

@@ -6,10 +6,7 @@
 
 #include "base/cpu.h"
 #include "data/json_out.h"
-#include "report/plot.h"
-#include "report/style.h"
 #include "study/chart.h"
-#include "study/runs_stat.h"
 #include "study/speed.h"
 
 enum { PANEL_GAP = 18 };
@@ -27,13 +24,6 @@ static const char *knob_name(speed_knob knob)
 
 /* ---- tables ---- */
 
-static void add_error(text *out, const bench_error *e, const char *between)
-{
-    text_number(out, e->psnr, 1);
-    text_add(out, between);
-    text_format(out, "%.2g", e->max);
-}
-
 static void add_tables(const void *of, text *out)
 {
     const speed_study *study = of;
@@ -50,49 +40,17 @@ static void add_tables(const void *of, text *out)
             const speed_row *row = &model->rows[i];
             text_format(out, "| %s | %s | %.3f | %.3f | %.3f | %.1f | %.0f | ", knob_name(row->knob),
                         row->value, row->picture_us, row->forward_us, row->both_us, row->blended, row->pairs);
-            add_error(out, &row->error, " | ");
-            text_add(out, " | ");
+            text_number(out, row->error.psnr, 1);
+            text_format(out, " | %.2g | ", row->error.max);
             text_number(out, row->photo_psnr, 2);
             text_add(out, " |\n");
-        }
-        for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            text_format(out, "| not built | %s | error only | %s | | | | ", model->ideas[i].name,
-                        model->ideas[i].reason);
-            add_error(out, &model->ideas[i].error, " | ");
-            text_add(out, " | |\n");
-        }
-    }
-}
-
-static void add_csv(const void *of, text *out)
-{
-    const speed_study *study = of;
-    text_add(out, "model,knob,value,kernel,isa,alpha_min,t_min,proxy_radius,tree_forward_core_us_per_ray,"
-                  "forward_core_us_per_ray,forward_adjoint_core_us_per_ray,blended_per_ray,row_pairs_per_"
-                  "packet,psnr,max_error,photo_psnr\n");
-    for (size_t m = 0; m < study->model_count; m++) {
-        const speed_model *model = &study->models[m];
-        for (size_t i = 0; i < model->row_count; i++) {
-            const speed_row *r = &model->rows[i];
-            stat_csv_text(out, model->name);
-            text_format(out, ",%s,\"%s\",%s,%s,%.9g,%.9g,%.9g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g\n",
-                        knob_name(r->knob), r->value, r->splats ? "" : bench_kernel_name(r->kernel),
-                        cpu_isa_name(r->isa), (double)r->settings.alpha_min,
-                        (double)r->settings.transmittance_min, (double)r->settings.proxy_radius,
-                        r->picture_us, r->forward_us, r->both_us, r->blended, r->pairs, r->error.psnr,
-                        r->error.max, r->photo_psnr);
-        }
-        for (size_t i = 0; i < SPEED_ERRORS; i++) {
-            stat_csv_text(out, model->name);
-            text_format(out, ",not built,%s,,,,,,,,,,,%.6g,%.6g,\n", model->ideas[i].name,
-                        model->ideas[i].error.psnr, model->ideas[i].error.max);
         }
     }
 }
 
 static json_t *model_to_json(const speed_model *model)
 {
-    json_t *rows = json_array(), *ideas = json_array();
+    json_t *rows = json_array();
     const double promised = 0.5 / 255,
                  kept = model->rows[0].error.max; /* of the preset "exact", which comes first */
     for (size_t i = 0; i < model->row_count; i++) {
@@ -111,15 +69,11 @@ static json_t *model_to_json(const speed_model *model)
                       "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max,
                       "photo_psnr", isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
     }
-    for (size_t i = 0; i < SPEED_ERRORS; i++)
-        json_array_append_new(ideas, json_pack("{s:s,s:s,s:f,s:f}", "name", model->ideas[i].name, "reason",
-                                               model->ideas[i].reason, "psnr", model->ideas[i].error.psnr,
-                                               "max_error", model->ideas[i].error.max));
     json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value",
                               kept, "pass", kept <= promised);
-    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:o,s:[o]}", "model", json_text(model->name), "gaussians",
+    return json_pack("{s:o,s:I,s:I,s:I,s:o,s:[o]}", "model", json_text(model->name), "gaussians",
                      (json_int_t)model->gaussians, "rays", (json_int_t)model->rays, "check_rays",
-                     (json_int_t)model->check_rays, "settings", rows, "not_built", ideas, "checks", check);
+                     (json_int_t)model->check_rays, "settings", rows, "checks", check);
 }
 
 static json_t *data_of(const void *of)
@@ -140,7 +94,6 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
 {
     const speed_model *model = &study->models[m];
     scatter_point points[SPEED_WAYS_MAX];
-    scatter_level levels[SPEED_ERRORS];
     char note[160];
     if (photos)
         snprintf(note, sizeof note, "%zu held-out photos", model->photo_count);
@@ -153,8 +106,6 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
                            .y_unit = photos ? y_photo_unit : y_unit,
                            .points = points,
                            .point_count = model->row_count,
-                           .levels = levels,
-                           .level_count = photos ? 0 : SPEED_ERRORS,
                            .apart = 1u << KNOB_KERNEL | 1u << KNOB_ISA | 1u << KNOB_RENDERER};
     for (int k = 0; k < KNOB_COUNT; k++)
         chart.series[k] = knob_name((speed_knob)k);
@@ -163,89 +114,24 @@ static void draw_panel(const speed_study *study, size_t m, bool photos, int top,
         points[i] = (scatter_point){(int)r->knob, r->picture_us, photos ? r->photo_psnr : r->error.psnr,
                                     r->is_default ? "" : r->value};
     }
-    for (size_t i = 0; i < SPEED_ERRORS; i++)
-        levels[i] = (scatter_level){model->ideas[i].error.psnr, model->ideas[i].name};
     scatter_draw(out, &chart, top);
-}
-
-static void add_svg(const speed_study *study, size_t first, size_t count, bool alone, text *out)
-{
-    size_t panels = 0;
-    for (size_t i = 0; i < count; i++)
-        panels += panel_count(&study->models[first + i]);
-    const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
-    scatter_begin(out, "speed against accuracy", "", height, !alone);
-    int top = 0;
-    for (size_t i = 0; i < count; i++)
-        for (size_t panel = 0; panel < panel_count(&study->models[first + i]);
-             panel++, top += SCATTER_HEIGHT + PANEL_GAP)
-            draw_panel(study, first + i, panel == 1, top, out);
-    text_add(out, "</svg>\n");
-}
-
-static void add_page_table(const speed_model *model, text *out)
-{
-    text_add(out,
-             "<details class=\"card\"><summary>The figures</summary><div class=\"scroll\"><table "
-             "class=\"list\"><thead><tr><th>knob</th><th>value</th>"
-             "<th>tree and forward, core-\xc2\xb5s/ray</th><th>forward</th><th>with adjoint</th><th>blended "
-             "per ray</th><th>PSNR, dB</th><th>max error</th><th>to photos, dB</th></tr></thead><tbody>");
-    for (size_t i = 0; i < model->row_count; i++) {
-        const speed_row *r = &model->rows[i];
-        text_format(out, "<tr><th>%s</th><td>%s</td><td>%.3f</td><td>%.3f</td><td>%.3f</td><td>%.1f</td><td>",
-                    knob_name(r->knob), r->value, r->picture_us, r->forward_us, r->both_us, r->blended);
-        add_error(out, &r->error, "</td><td>");
-        text_add(out, "</td><td>");
-        text_number(out, r->photo_psnr, 2);
-        text_add(out, "</td></tr>");
-    }
-    for (size_t i = 0; i < SPEED_ERRORS; i++) {
-        text_format(out, "<tr><th>not built: %s</th><td></td><td colspan=\"4\">error only: %s</td><td>",
-                    model->ideas[i].name, model->ideas[i].reason);
-        add_error(out, &model->ideas[i].error, "</td><td>");
-        text_add(out, "</td><td></td></tr>");
-    }
-    text_add(out, "</tbody></table></div></details>\n");
-}
-
-static void add_page(const void *of, const char *folder, text *out)
-{
-    const speed_study *study = of;
-    (void)folder;
-    text_add(out, "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-                  "content=\"width=device-width,initial-scale=1\">"
-                  "<title>Speed against accuracy</title>\n<style>\n");
-    text_add(out, report_css);
-    text_add(out, plot_css);
-    text_add(out, scatter_css);
-    text_add(out,
-             ".panel{margin:1rem 0 .5rem;padding:.6rem .9rem}\n</style></head>\n<body>\n<header><h1>Speed "
-             "against accuracy</h1><p class=\"lead\">What each setting of the tracer costs, and how far its "
-             "picture is from the one without any cut-off, traced in double. Up and left is better. Each "
-             "line moves one knob away from the preset <b>default</b>; dashed heights are ideas that were "
-             "not built, of which only the error was measured.</p></header>\n<main>\n");
-    for (size_t m = 0; m < study->model_count; m++) {
-        text_add(out, "<figure class=\"card panel\">");
-        add_svg(study, m, 1, false, out);
-        text_add(out, "</figure>\n");
-        add_page_table(&study->models[m], out);
-    }
-    text_add(out, "</main>\n<footer><p>Processor time of all threads per ray, median of ");
-    text_format(out, "%d", study->repeats);
-    text_add(out, " passes taken in turn. What the settings mean, and what their errors are bounded by: "
-                  "<code>docs/accuracy.md</code>. This page is one file and loads "
-                  "nothing.</p></footer>\n</body></html>\n");
 }
 
 static void add_charts(const void *of, text *out)
 {
     const speed_study *study = of;
-    add_svg(study, 0, study->model_count, true, out);
+    size_t panels = 0;
+    for (size_t m = 0; m < study->model_count; m++)
+        panels += panel_count(&study->models[m]);
+    const int height = (int)panels * (SCATTER_HEIGHT + PANEL_GAP) - PANEL_GAP;
+    scatter_begin(out, "speed against accuracy", "", height);
+    int top = 0;
+    for (size_t m = 0; m < study->model_count; m++)
+        for (size_t panel = 0; panel < panel_count(&study->models[m]);
+             panel++, top += SCATTER_HEIGHT + PANEL_GAP)
+            draw_panel(study, m, panel == 1, top, out);
+    text_add(out, "</svg>\n");
 }
 
-const study_output speed_output = {.name = "speed",
-                                   .csv = add_csv,
-                                   .tables = add_tables,
-                                   .charts = add_charts,
-                                   .data = data_of,
-                                   .page = add_page};
+const study_output speed_output = {
+    .name = "speed", .tables = add_tables, .charts = add_charts, .data = data_of};

@@ -108,30 +108,7 @@ static void add_tables(const void *study, text *out)
     }
 }
 
-/* ---- CSV, JSON ---- */
-
-static void add_csv_row(const grid_study *s, size_t scene, size_t variant, int seed, double seconds,
-                        double psnr, bool is_end, text *out)
-{
-    const study_figures *run = study_grid_at(&s->grid, scene, variant, seed);
-    stat_csv_text(out, s->grid.names[scene]);
-    text_format(out, ",\"%s\",%d,%d,%.6g,%.9g,%.0f,%.0f\n", time_variants[variant].name, seed, is_end,
-                seconds, psnr, run->iterations, run->anchors_final);
-}
-
-static void add_csv(const void *study, text *out)
-{
-    const grid_study *s = study;
-    text_add(out, "scene,run,seed,is_end,seconds,psnr,iterations,anchors_final\n");
-    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
-        for (size_t v = 0; v < time_variant_count; v++)
-            for (int seed = 0; seed < s->grid.seeds; seed++) {
-                const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
-                for (size_t i = 0; i < run->mark_count; i++)
-                    add_csv_row(s, scene, v, seed, run->marks[i].seconds, run->marks[i].psnr, false, out);
-                add_csv_row(s, scene, v, seed, run->train_seconds, run->psnr, true, out);
-            }
-}
+/* ---- JSON ---- */
 
 static json_t *curve_to_json(const grid_study *s, size_t scene, size_t variant)
 {
@@ -213,11 +190,11 @@ static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
 static void add_charts(const void *study, text *out)
 {
     const grid_study *s = study;
-    scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count, false);
+    scatter_begin(out, "PSNR against seconds", "", SCATTER_HEIGHT * (int)s->grid.scene_count);
     for (size_t scene = 0; scene < s->grid.scene_count; scene++)
         draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
     text_add(out, "</svg>\n");
 }
 
 const study_output time_output = {
-    .name = "time", .csv = add_csv, .tables = add_tables, .charts = add_charts, .data = data_of};
+    .name = "time", .tables = add_tables, .charts = add_charts, .data = data_of};

@@ -367,10 +367,3 @@ void point_tree_free(point_tree *tree)
     mem_free(tree->index);
     mem_free(tree);
 }
-
-size_t point_tree_bytes(const point_tree *t)
-{
-    return sizeof *t + t->node_count * sizeof *t->nodes +
-           t->count *
-               (3 * sizeof *t->coordinate + sizeof *t->index + (t->radius != NULL ? sizeof *t->radius : 0));
-}

@@ -51,8 +51,6 @@ gbt_status point_tree_build(number_array position, number_array radius, size_t c
                             gbt_error *err);
 void point_tree_free(point_tree *tree); /* NULL is fine */
 
-size_t point_tree_bytes(const point_tree *tree);
-
 /* ---- one by one ---- */
 
 /**

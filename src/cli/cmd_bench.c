@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/cmd_bench.c -- gbtrace bench trace, bench query, and gbtrace check-grad. */
+/* cli/cmd_bench.c -- gbtrace bench trace and gbtrace check-grad. */
 #include <stdio.h>
-#include <string.h>
 
 #include "cli/options.h"
 #include "lab/lab.h"
@@ -9,35 +8,28 @@
 static const command_word *workloads(void)
 {
     static const command_word words[] = {{"trace", "forward and backward pass of the ray tracer"},
-                                         {"query", "nearest neighbours: ours, FLANN, brute force"},
                                          {NULL, NULL}};
     return words;
 }
 
 static lab_bench_def def;
-static lab_bench_query_def query_def;
-static const char *query_folder;
 
 static const option *options_bench(int *count)
 {
     def = lab_bench_def_default();
-    query_def = lab_bench_query_def_default();
     static const option rows[] = {
         {.name = "model",
-         .of = "trace",
          .kind = OPTION_STRING,
          .value = &def.model,
          .value_name = "FILE|RUN",
          .help = "plain Gaussians (gbtrace export --help lists their formats), or a trained run"},
         {.name = "camera",
-         .of = "trace",
          .kind = OPTION_STRING,
          .value = &def.camera,
          .value_name = "FILE.json",
          .help = "a camera file (docs/cameras.md); needed for plain Gaussians; default: the run's first "
                  "held-out view"},
         {.name = "alpha-min",
-         .of = "trace",
          .kind = OPTION_FLOAT,
          .value = &def.alpha_min,
          .min = 0,
@@ -46,7 +38,6 @@ static const option *options_bench(int *count)
          .help = "ignore hits with an alpha below this; 0: as the run, else 1/255",
          .rare = true},
         {.name = "alpha-max",
-         .of = "trace",
          .kind = OPTION_FLOAT,
          .value = &def.alpha_max,
          .min = 0,
@@ -55,7 +46,6 @@ static const option *options_bench(int *count)
          .help = "clamp alpha to this; 0: as the run, else 0.99",
          .rare = true},
         {.name = "t-min",
-         .of = "trace",
          .kind = OPTION_FLOAT,
          .value = &def.t_min,
          .min = 0,
@@ -64,13 +54,11 @@ static const option *options_bench(int *count)
          .help = "stop a ray below this transmittance; 0: as the run, else 1e-4",
          .rare = true},
         {.name = "preset",
-         .of = "trace",
          .kind = OPTION_CHOICE,
          .value = &def.preset,
          .choices = GBT_PRESET_NAMES,
          .help = "cut-off preset (docs/accuracy.md); --alpha-min and --t-min override it"},
         {.name = "kernel",
-         .of = "trace",
          .kind = OPTION_STRING,
          .value = &def.kernel,
          .value_name = "LIST",
@@ -80,7 +68,6 @@ static const option *options_bench(int *count)
              "list, packet (lists, with one order for 16 rays), tile, single, embree or splats; list,tile "
              "measures both alternately and compares them"},
         {.name = "repeats",
-         .of = "trace",
          .kind = OPTION_INT,
          .value = &def.repeats,
          .min = 1,
@@ -90,38 +77,12 @@ static const option *options_bench(int *count)
         {.name = "check",
          .kind = OPTION_FLAG,
          .value = &def.check,
-         .help =
-             "compare with the double-precision reference, with the same cut-offs and without any; queries "
-             "with brute force"},
+         .help = "compare with the double-precision reference, with the same cut-offs and without any"},
         {.name = "json",
-         .of = "trace",
          .kind = OPTION_STRING,
          .value = &def.json,
          .value_name = "FILE",
          .help = "write the figures to this file"},
-        {.name = "points",
-         .of = "query",
-         .kind = OPTION_UINT64,
-         .value = &query_def.points,
-         .min = 10000,
-         .max = 10000000,
-         .value_name = "N",
-         .help = "the largest cloud, beside its tenths down to 10000"},
-        {.name = "queries",
-         .of = "query",
-         .kind = OPTION_UINT64,
-         .value = &query_def.queries,
-         .min = 1,
-         .max = 10000000,
-         .value_name = "N",
-         .help = "how many"},
-        {.name = "output",
-         .of = "query",
-         .short_name = 'o',
-         .kind = OPTION_STRING,
-         .value = &query_folder,
-         .value_name = "DIR",
-         .help = "write query.csv, query.json and query.svg there"},
     };
     *count = sizeof rows / sizeof *rows;
     return rows;
@@ -130,18 +91,15 @@ static const option *options_bench(int *count)
 static int run_bench(const operands *given)
 {
     gbt_error err = {0};
-    if (strcmp(given->value[0], "query") == 0) {
-        query_def.check = def.check;
-        return command_failed(lab_bench_query(&query_def, query_folder, stdout, &err), &err);
-    }
+    (void)given; /* one word, which options_parse() has compared */
     if (def.model == NULL)
         return command_misused("bench trace: --model is missing (wanted --model FILE|RUN)");
     return command_failed(lab_bench_trace(&def, stdout, &err), &err);
 }
 
 const command command_bench = {.name = "bench",
-                               .summary = "benchmark the ray tracer on given Gaussians, or neighbour queries",
-                               .usage = "trace --model FILE|RUN [--camera FILE.json] | query [-o DIR]",
+                               .summary = "benchmark the ray tracer on given Gaussians",
+                               .usage = "trace --model FILE|RUN [--camera FILE.json]",
                                .options = options_bench,
                                .min_operands = 1,
                                .max_operands = 1,

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/file.h"
 #include "data/compressed_ply.h"
 #include "data/number.h"
 #include "data/ply.h"
@@ -166,20 +165,6 @@ bool gaussian_ply_has_gaussians(const source_file *file)
     const int vertex = ply_find_element(&header, "vertex");
     return compressed_ply_is(&header) || (vertex >= 0 && ply_find_property(&header, vertex, "f_dc_0") >= 0 &&
                                           ply_find_property(&header, vertex, "rot_0") >= 0);
-}
-
-gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err)
-{
-    memset(out, 0, sizeof *out);
-    source_file file = {.name = path};
-    unsigned char *bytes;
-    GBT_TRY(file_read(path, &bytes, &file.size, err));
-    file.bytes = bytes;
-    const gbt_status status = gaussian_ply_read(&file, out, err);
-    mem_free(bytes);
-    if (status == GBT_OK)
-        gaussian_cloud_warn(out, path);
-    return status;
 }
 
 /* ---- by parts ---- */

@@ -40,9 +40,6 @@ static inline void gaussian_ply_put_near(sink *s, const gaussian_cloud *cloud)
  */
 gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
-/** The same from a path. */
-gbt_status gaussian_ply_load(const char *path, gaussian_cloud *out, gbt_error *err);
-
 /** Whether the header names what every Gaussian has: false for points, anchors, and what is no .ply. */
 bool gaussian_ply_has_gaussians(const source_file *file);
 

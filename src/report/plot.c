@@ -218,7 +218,7 @@ void plot_line_to(text *out, const plot *p, bool *open, double x, double y)
 
 /* ---- files ---- */
 
-const char plot_css[] =
+static const char plot_css[] =
     ".plot{--k0:#1b1c1e;--k1:#0b62c4;--k2:#d9480f;--k3:#2b8a3e;--k4:#7b3fc4;--k5:#b0246e;--k6:#0a7f8c;--"
     "page:#fff;--text:#1b1c1e;--dim:#62666d;--rule:#e8e8e5}\n"
     "@media(prefers-color-scheme:dark){.plot{--k0:#f2f2f0;--k1:#6cb0ff;--k2:#ff9a5c;--k3:#6fd08c;--k4:#"
@@ -232,17 +232,12 @@ const char plot_css[] =
     ".plot .s0{--k:var(--k0)}.plot .s1{--k:var(--k1)}.plot .s2{--k:var(--k2)}.plot .s3{--k:var(--k3)}.plot "
     ".s4{--k:var(--k4)}.plot .s5{--k:var(--k5)}.plot .s6{--k:var(--k6)}\n";
 
-void plot_begin(text *out, const char *label, const char *css, const char *more, int width, int height,
-                bool in_page)
+void plot_begin(text *out, const char *label, const char *css, const char *more, int width, int height)
 {
-    text_format(out, "<svg %sclass=\"plot\" viewBox=\"0 0 %d %d\" ",
-                in_page ? "" : "xmlns=\"http://www.w3.org/2000/svg\" ", width, height);
-    if (!in_page)
-        text_format(out, "width=\"%d\" ", width);
-    text_format(out, "role=\"img\" aria-label=\"%s\">", label);
-    if (in_page)
-        return;
-    text_add(out, "<style>");
+    text_format(out,
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" viewBox=\"0 0 %d %d\" width=\"%d\" "
+                "role=\"img\" aria-label=\"%s\"><style>",
+                width, height, width, label);
     text_add(out, plot_css);
     text_add(out, css);
     text_add(out, more);

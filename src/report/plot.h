@@ -62,13 +62,9 @@ void plot_draw_axes(text *out, const plot *p);
 /** Go on with the path that is being written, or begin it: `*open` is false then, and true afterwards. */
 void plot_line_to(text *out, const plot *p, bool *open, double x, double y);
 
-/** Rules for an SVG of class "plot", light and dark: texts (title, key), axes, and the colours of the classes
-   s0 (that of texts) to s6 as --k. */
-extern const char plot_css[];
-
-/** An SVG begins, of class "plot"; "</svg>" ends it. In a file of its own it has its paper and its rules:
-   plot_css, `css` and `more` (""; more rules). In a page it has neither. */
-void plot_begin(text *out, const char *label, const char *css, const char *more, int width, int height,
-                bool in_page);
+/** An SVG file begins, of class "plot", with its paper and its rules, light and dark: texts (title, key),
+   axes, the colours of the classes s0 (that of texts) to s6 as --k; then `css` and `more` (""; more rules).
+   "</svg>" ends it. */
+void plot_begin(text *out, const char *label, const char *css, const char *more, int width, int height);
 
 #endif

@@ -11,7 +11,6 @@
 #include "base/vec.h"
 #include "cells/view.h"
 #include "data/gaussian_file.h"
-#include "data/gaussian_ply.h"
 #include "frame/frame.h"
 
 enum { WIDTH = 72, HEIGHT = 56, CHUNK_ROWS = 40 };
@@ -80,7 +79,7 @@ static void open_both(both *b, gaussian_cloud *cloud)
     memset(b, 0, sizeof *b);
     assert_ok(gaussian_file_write(ply, cloud, nowhere, NULL));
     gaussian_cloud_free(cloud);
-    assert_ok(gaussian_ply_load(ply, &b->cloud, NULL));
+    assert_ok(gaussian_file_read(ply, &b->cloud, NULL));
     for (size_t i = 0; i < 3 * b->cloud.count; i++) {
         low[i % 3] = fmin(low[i % 3], (double)b->cloud.mean[i]);
         high[i % 3] = fmax(high[i % 3], (double)b->cloud.mean[i]);

@@ -2,6 +2,7 @@
 /* tests/data/test_gaussian_ply.c -- 3DGS models: layout, repairs, refusals. */
 #include "data_support.h"
 
+#include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 
 /* A model in ASCII: `rest` f_rest properties, rows of mean, dc, rest, opacity, scale, rot as the usual
@@ -273,7 +274,7 @@ static void same_as_arrays(void **state)
     if (path == NULL || center == NULL || scale == NULL || quat == NULL || opacity == NULL || sh == NULL)
         skip();
     gaussian_cloud cloud;
-    assert_ok(gaussian_ply_load(path, &cloud, &assert_ok_err_));
+    assert_ok(gaussian_file_read(path, &cloud, &assert_ok_err_));
     assert_int_equal(cloud.count, COUNT);
     for (size_t i = 0; i < COUNT; i++) {
         const float *q = cloud.quat + 4 * i, *want = quat + 4 * i;
@@ -310,7 +311,7 @@ static void real_models(void **state)
             continue;
         found++;
         gaussian_cloud cloud;
-        assert_ok(gaussian_ply_load(path, &cloud, &assert_ok_err_));
+        assert_ok(gaussian_file_read(path, &cloud, &assert_ok_err_));
         assert_int_equal(cloud.count, models[i].count);
         assert_int_equal(cloud.dropped, 0);
         gaussian_cloud_free(&cloud);

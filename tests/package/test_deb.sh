@@ -31,6 +31,7 @@ dpkg-deb -I "$deb" >"$work/info"
 for wanted in libc6 libstdc++6 libembree libtbb12 libopenimageio libjansson4 zlib1g libzstd1 libwebp libzip libmicrohttpd libsqlite3-0; do
     check "depends on $wanted" grep -q "^ Depends:.*$wanted" "$work/info"
 done
+check "depends on nothing of the tests" sh -c "! grep '^ Depends:.*flann' '$work/info'"
 check "ldconfig is asked for" sh -c "dpkg-deb --ctrl-tarfile '$deb' | tar -xO ./triggers | grep -q ldconfig"
 # What is our choice is in cmake/debian/lintian-overrides, with the reason.
 if command -v lintian >/dev/null 2>&1; then

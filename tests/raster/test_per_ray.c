@@ -2,7 +2,7 @@
 /* tests/raster/test_per_ray.c -- the per-ray form against the tracer and the tracer's double reference,
    forward and back. */
 #include "base/near.h"
-#include "data/gaussian_ply.h"
+#include "data/gaussian_file.h"
 #include "raster/raster_support.h"
 #include "trace/reference_once.h"
 #include "trace/trace.h"
@@ -188,7 +188,7 @@ static void peer_scene_agrees(void **state)
     gaussians g = {0};
     if (path == NULL)
         skip();
-    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    assert_ok(gaussian_file_read(path, &cloud, NULL));
     assert_ok(gaussians_resize(&g, cloud.count, NULL));
     float *f[GAUSSIANS_FIELD_COUNT];
     field_list(&g, f);

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "data/gaussian_cloud.h"
-#include "data/gaussian_ply.h"
+#include "data/gaussian_file.h"
 #include "data/scene.h"
 #include "gbtrace/make_scene.h"
 #include "remove_tree.h"
@@ -291,7 +291,7 @@ static void gaussians_lie_on_surfaces(void **state)
     gaussian_cloud cloud;
     assert_ok(scene_load(folder, &split, &s, NULL));
     snprintf(path, sizeof path, "%s/gaussians.ply", folder);
-    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    assert_ok(gaussian_file_read(path, &cloud, NULL));
     assert_int_equal(cloud.count, COUNT);
     assert_int_equal(cloud.sh_degree, 3);
     image depth;

@@ -240,16 +240,18 @@ static size_t count_of(const char *where, const char *what)
     return count;
 }
 
-static double metric_of(const char *run, const char *field)
+static double number_of(const char *run, const char *file, const char *field)
 {
     json_t *whole;
     char path[2 * PATH_SIZE];
-    snprintf(path, sizeof path, "%s/metrics.json", run);
+    snprintf(path, sizeof path, "%s/%s", run, file);
     assert_ok(json_read(path, &whole, NULL));
     const double value = json_number_value(json_object_get(whole, field));
     json_decref(whole);
     return value;
 }
+
+static double metric_of(const char *run, const char *field) { return number_of(run, "metrics.json", field); }
 
 static struct timespec time_of(const char *run)
 {
@@ -266,38 +268,46 @@ static bool is_newer(struct timespec a, struct timespec b)
     return a.tv_sec > b.tv_sec || (a.tv_sec == b.tv_sec && a.tv_nsec > b.tv_nsec);
 }
 
-/* Every line of the CSV is what the run's own metrics.json says. */
-static void check_csv(const char *folder)
+static double mean_in(const char *folder, const char *variant, const char *file, const char *field)
 {
-    char *csv = read_text(in_root("%s/paper.csv", folder)), *line = strchr(csv, '\n');
-    size_t lines = 0;
-    for (; line != NULL && line[1] != '\0'; line = strchr(line + 1, '\n'), lines++) {
-        char name[64];
-        int seed;
-        double v[9];
-        assert_int_equal(sscanf(line + 1, "\"tiny\",%63[^,],%d,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", name,
-                                &seed, v, v + 1, v + 2, v + 3, v + 4, v + 5, v + 6, v + 7, v + 8),
-                         11);
-        const char *run = in_root("%s/runs/tiny/%s/seed-%d", folder, name, seed);
-        const char *const fields[] = {
-            "points", "anchors_initial", "anchors_final", NULL, "model_bytes", "psnr", "ssim"};
-        for (size_t i = 0; i < 7; i++)
-            if (fields[i] != NULL)
-                assert_near(v[i], metric_of(run, fields[i]), 1e-6 * fabs(v[i]));
-        assert_near(v[3], (316 * v[2] + 4 * 7086) / 1048576, 1e-5 * v[3]);
-        assert_true(v[7] > 0 && v[7] <= v[2]);          /* in view: some of all */
-        assert_near(v[8], 6880e-9 * v[7], 1e-5 * v[8]); /* K = 10, no distance */
-    }
-    assert_int_equal(lines, 5 * SEEDS);
-    mem_free(csv);
+    double sum = 0;
+    for (int seed = 0; seed < SEEDS; seed++)
+        sum += number_of(in_root("%s/runs/tiny/%s/seed-%d", folder, variant, seed), file, field) / SEEDS;
+    return sum;
 }
 
 static double mean_over_seeds(const char *folder, const char *variant, const char *field)
 {
-    double sum = 0;
-    for (int seed = 0; seed < SEEDS; seed++)
-        sum += metric_of(in_root("%s/runs/tiny/%s/seed-%d", folder, variant, seed), field) / SEEDS;
-    return sum;
+    return mean_in(folder, variant, "metrics.json", field);
+}
+
+static double figure_of(const json_t *run, const char *name)
+{
+    return json_number_value(json_object_get(json_object_get(run, name), "mean"));
+}
+
+/* The figures of every variant are what the runs' own files say. */
+static void check_figures(const char *folder, const json_t *figures)
+{
+    static const char *const fields[][2] = {{"initial anchors", "anchors_initial"},
+                                            {"final anchors", "anchors_final"},
+                                            {"PSNR", "psnr"},
+                                            {"SSIM", "ssim"}};
+    assert_int_equal(json_array_size(figures), 5);
+    for (size_t i = 0; i < 5; i++) {
+        const json_t *row = json_array_get(figures, i);
+        const char *name = json_string_value(json_object_get(row, "variant"));
+        for (size_t f = 0; f < sizeof fields / sizeof *fields; f++)
+            assert_near(figure_of(row, fields[f][0]), mean_over_seeds(folder, name, fields[f][1]), 1e-9);
+        const double final = figure_of(row, "final anchors"),
+                     in_view = mean_in(folder, name, "study.json", "anchors_in_view");
+        assert_near(figure_of(row, "model.gbt"), mean_over_seeds(folder, name, "model_bytes") / 1048576,
+                    1e-9);
+        assert_near(figure_of(row, "storage"), (316 * final + 4 * 7086) / 1048576, 1e-9);
+        assert_true(in_view > 0 && in_view <= final);                       /* some of all */
+        assert_near(figure_of(row, "arithmetic"), 6880e-9 * in_view, 1e-9); /* K = 10, no distance */
+    }
+    assert_string_equal(json_string_value(json_object_get(json_array_get(figures, 0), "variant")), "voxel");
 }
 
 static const json_t *row_of(const json_t *whole, const char *name)
@@ -328,10 +338,7 @@ static void check_json(const char *folder)
                 mean_over_seeds(folder, "gbai-gbsp", "psnr") - mean_over_seeds(folder, "voxel", "psnr"),
                 1e-6);
     assert_near(json_number_value(json_object_get(change, "paper")), -0.071, 0.001);
-    const json_t *first = json_array_get(json_object_get(whole, "figures"), 0);
-    assert_string_equal(json_string_value(json_object_get(first, "variant")), "voxel");
-    assert_near(json_number_value(json_object_get(json_object_get(first, "final anchors"), "mean")),
-                mean_over_seeds(folder, "voxel", "anchors_final"), 1e-9);
+    check_figures(folder, json_object_get(whole, "figures"));
     json_decref(whole);
 }
 
@@ -360,7 +367,6 @@ static void the_papers_tables(void **state)
     const char *data[] = {tiny};
     const lab_runs_def def = small_paper(data, "1,2");
     paper_ok(&def, in_root("paper"));
-    check_csv("paper");
     check_json("paper");
     check_page("paper");
     assert_false(file_exists(in_root("paper/runs/tiny/voxel/seed-0/checkpoints")));
@@ -391,8 +397,8 @@ static void lpips_of_finished_runs(void **state)
     network alex = make_alex();
     write_network(&alex, in_root("alex.safetensors"), NULL);
     free_network(&alex);
-    char *before = read_text(in_root("paper/paper.csv")), *page;
-    assert_true(strstr(before, "seconds,lpips_01\n") != NULL && strstr(before, ",\n") != NULL);
+    char *before = read_text(in_root("paper/paper.json")), *page;
+    assert_null(strstr(before, "\"LPIPS\""));
     const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
     def.lpips = in_root("alex.safetensors");
     paper_ok(&def, in_root("paper"));
@@ -429,7 +435,7 @@ static void lpips_of_finished_runs(void **state)
 
     def.lpips = NULL; /* no column, and the scores of before */
     paper_ok(&def, in_root("paper"));
-    page = read_text(in_root("paper/paper.csv"));
+    page = read_text(in_root("paper/paper.json"));
     assert_string_equal(page, before);
     mem_free(before);
     mem_free(page);
@@ -447,7 +453,6 @@ static void runs_are_made_once(void **state)
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++)
             before[v][seed] = time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed));
-    bytes csv = read_bytes(in_root("paper/paper.csv"));
     bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
     assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data,
                                 metrics.count / 2, NULL)); /* damaged */
@@ -471,7 +476,6 @@ static void runs_are_made_once(void **state)
                                     "0.0 | -6.0 |  | none at all |"),
                      1);
     mem_free(page);
-    mem_free(csv.data);
     mem_free(metrics.data);
 
     lab_runs_def other = small_paper(data, "1"); /* other settings */
@@ -623,11 +627,6 @@ static void quality_against_time(void **state)
 
 /* ---- anchors ---- */
 
-static double figure_of(const json_t *run, const char *name)
-{
-    return json_number_value(json_object_get(json_object_get(run, name), "mean"));
-}
-
 static void what_a_scene_needs(void **state)
 {
     (void)state;
@@ -668,12 +667,9 @@ static void what_a_scene_needs(void **state)
     const double paper = figure_of(json_array_get(runs, 1), "anchors_initial");
     assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") == floor(paper / 2));
     json_decref(whole);
-    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg")),
-         *csv = read_text(in_root("anchors/anchors.csv"));
+    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg"));
     assert_int_equal(count_of(page, "| random points |"), 1);
-    assert_int_equal(count_of(csv, "\n"), 1 + 2 * anchors_variant_count);
     assert_null(strstr(svg, "nan"));
-    mem_free(csv);
     mem_free(svg);
     mem_free(page);
 }

@@ -3,7 +3,7 @@
    docs/accuracy.md, and comes near them. */
 #include "base/memory.h"
 #include "base/near.h"
-#include "data/gaussian_ply.h"
+#include "data/gaussian_file.h"
 #include "trace/fixture.h"
 #include "trace/random_scene.h"
 #include "trace/reference.h"
@@ -205,7 +205,7 @@ static void peer_scene_stays_in_bounds(void **state)
         skip();
     gaussian_cloud cloud;
     gaussians g = {0};
-    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    assert_ok(gaussian_file_read(path, &cloud, NULL));
     assert_ok(gaussians_resize(&g, cloud.count, NULL));
     const float scale = 0.12f; /* to where pinhole_rays() looks */
     float *const means[3] = {g.mean_x, g.mean_y, g.mean_z}, *const scales[3] = {g.scale_x, g.scale_y,

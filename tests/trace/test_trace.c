@@ -6,7 +6,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
-#include "data/gaussian_ply.h"
+#include "data/gaussian_file.h"
 #include "test_support.h"
 #include "trace/fixture.h"
 #include "trace/random_scene.h"
@@ -1198,7 +1198,7 @@ static void peer_scene(void **state)
     if (path == NULL)
         skip();
     gaussian_cloud cloud;
-    assert_ok(gaussian_ply_load(path, &cloud, NULL));
+    assert_ok(gaussian_file_read(path, &cloud, NULL));
     gaussians g = some(cloud.count, 0);
     for (size_t i = 0; i < cloud.count; i++) {
         const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i,

@@ -59,6 +59,8 @@ typedef struct scene {
     bool has_split;          /* the data set itself says which views are held out */
     char *held_out_list; /* [held_out_bytes] SCENE_SPLIT_LIST: the list as it was read; else NULL; owned */
     size_t held_out_bytes;
+    char *missing_lines; /* [missing_bytes] names of all views left out, each ended by a new line; owned */
+    size_t missing_bytes;
 } scene;
 
 typedef enum scene_split_kind {

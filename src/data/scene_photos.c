@@ -62,8 +62,8 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     for (size_t i = 0; i < raw->view_count && status == GBT_OK; i++) {
         raw_view view = raw->views[i];
         status = find_files(folder, images, raw->has_masks ? masks : NULL, &view, err);
-        if (view.path == NULL)
-            raw_count_missing(raw, view.name);
+        if (status == GBT_OK && view.path == NULL)
+            status = raw_count_missing(raw, view.name, err);
         raw->views[i] = raw->views[kept]; /* what is left out goes behind, where raw_free() finds it */
         raw->views[kept] = view;
         kept += view.path != NULL;

@@ -125,8 +125,8 @@ static inline void scene_view_free(scene_view *view)
 void scene_set_alpha(scene *s, gbt_alpha alpha);
 
 /**
- * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the
- * colour. Cost: opens every training photo.
+ * What is behind everything, when a training photo is transparent in places and lies on a colour: true, and
+ * the colour. Cost: opens every training photo, reads up to four with an alpha channel.
  */
 bool scene_background(const scene *s, float color[3]);
 
@@ -152,8 +152,8 @@ gbt_status scene_read_photo_valid(const scene_view *view, int width, int height,
 /**
  * scene_read_photo_valid(), and what of the photo's alpha channel lies on a colour.
  *
- * @param through [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are opaque
- * by the file's format, or alpha is a mask; free with image_free()
+ * @param through [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are
+ * opaque, or alpha is a mask; free with image_free()
  */
 gbt_status scene_read_photo_through(const scene_view *view, int width, int height, image *out,
                                     unsigned char **valid, image *through, gbt_error *err);

@@ -83,6 +83,8 @@ report $? "and writes its model" "$(cat err)"
     grep -q '^{"schema": 1, "width": 32, "height": 24, "psnr": [0-9.]*, "ssim": [0-9.]*, "ssim_interior": [0-9.]*, "flip": [0-9.e-]*}$' scores &&
     [ "$(sed 's/.*"psnr": \([0-9]*\).*/\1/' scores)" -ge 90 ]
 report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat scores)"
+mkdir floats && cp -r made/* floats && cp shown/0000.exr floats/images/0001.png &&
+    holds "EXR photos are told" 0 '^warning: floats: EXR photos, which are used as they are, values above 1 cut: 1$' train floats -o floats/run --iterations 3
 "$program" train made -o splats --renderer raster --iterations 3 --quiet >out 2>err && ! "$program" render splats -o none --outputs depth >>out 2>>err &&
     "$program" render splats -o splats-exact --renderer reference --outputs depth >>out 2>>err && [ -s splats-exact/0000.depth.exr ]
 report $? "the reference, and depth beside it, of a model of splats" "$(cat err out; ls splats-exact)"

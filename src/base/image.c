@@ -31,6 +31,14 @@ gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *
     return image_alloc(im, width, height, channels, err);
 }
 
+bool image_is_transparent(const image *im)
+{
+    for (size_t i = 0; im->channels == 4 && i < (size_t)im->width * (size_t)im->height; i++)
+        if (im->pixels[4 * i + 3] < 1)
+            return true;
+    return false;
+}
+
 void image_free(image *im)
 {
     mem_free(im->pixels);

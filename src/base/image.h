@@ -4,6 +4,7 @@
 #ifndef GBT_BASE_IMAGE_H
 #define GBT_BASE_IMAGE_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "gbtrace/status.h"
@@ -21,6 +22,9 @@ typedef struct image {
 
 gbt_status image_alloc(image *out, int width, int height, int channels, gbt_error *err);
 void image_free(image *im); /* zeroes the struct */
+
+/** Whether it has a fourth channel, alpha, that is below 1 somewhere. */
+bool image_is_transparent(const image *im);
 
 /** Make `im` of that size, unless it is: what it held is lost then. Start from {0}. */
 gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *err);

@@ -80,7 +80,7 @@ static gbt_status read_list(const json_t *list, const char *path, scene *out, gb
         const char *name = given != NULL && !is_taken(out, given) ? given : numbered;
         const raw_place place = {path, RAW_MARK_FRAME, i};
         scene_view *view = &out->views[i];
-        GBT_TRY(raw_check_name(name, strlen(name), place, err));
+        GBT_TRY(raw_check_name("image name", name, strlen(name), place, err));
         GBT_TRY(read_camera(entry, place, &view->camera, err));
         view->name = raw_copy_text(name, strlen(name), err);
         if (view->name == NULL)

@@ -46,7 +46,7 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
                             const double quaternion[4], const double translation[3], uint32_t camera_id,
                             const char *name, size_t name_length, raw_place place, gbt_error *err)
 {
-    GBT_TRY(raw_check_name(name, name_length, place, err));
+    GBT_TRY(raw_check_name("image name", name, name_length, place, err));
     const double *q = quaternion;
     const double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     if (!(fabs(norm - 1) <= 1e-3))

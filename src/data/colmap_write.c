@@ -35,7 +35,7 @@ static gbt_status check_image(const model *m, size_t i, gbt_error *err)
     if (gbt_camera_param_count(im->camera.model) == 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "COLMAP image %zu: unknown camera model %d", i,
                          (int)im->camera.model);
-    if (raw_check_name(im->name, strlen(im->name), place, &why) != GBT_OK ||
+    if (raw_check_name("image name", im->name, strlen(im->name), place, &why) != GBT_OK ||
         raw_check_camera(&im->camera, place, &why) != GBT_OK)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", why.text);
     for (size_t k = 0; k < im->observation_count; k++)

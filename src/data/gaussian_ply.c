@@ -22,7 +22,19 @@ enum {
 typedef struct gaussian_rows {
     gaussian_cloud *out;
     size_t rest_count; /* f_rest properties: 0, 9, 24 or 45 */
+    bool has_filter;   /* filter_3D is behind them */
 } gaussian_rows;
+
+/* Wider by `filter` along each axis, and as much less opaque: the 3D smoothing filter of Yu 2024, which its
+   files have beside what it acts on. */
+static void widen(gaussian_row *row, double filter)
+{
+    for (int k = 0; k < 3 && filter != 0; k++) {
+        const double before = exp(2 * row->scale_log[k]), after = before + filter * filter;
+        row->opacity *= sqrt(before / after);
+        row->scale_log[k] = 0.5 * log(after);
+    }
+}
 
 static void add_row(void *context, const double *values)
 {
@@ -38,12 +50,14 @@ static void add_row(void *context, const double *values)
         for (size_t k = 0; k < per_channel; k++)
             row.sh[1 + k][channel] = values[COLUMN_REST + channel * per_channel + k];
     }
+    if (rows->has_filter)
+        widen(&row, values[COLUMN_REST + rows->rest_count]);
     gaussian_cloud_add(rows->out, &row);
 }
 
 /* Property indices of the columns; says what is missing. */
 static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, int *columns,
-                               size_t *rest_count, gbt_error *err)
+                               size_t *rest_count, bool *has_filter, gbt_error *err)
 {
     static const char *const names[FIXED_COLUMNS] = {"x",       "y",       "z",      "opacity", "scale_0",
                                                      "scale_1", "scale_2", "rot_0",  "rot_1",   "rot_2",
@@ -83,7 +97,9 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: wrong number of f_rest properties (wanted 0, 9, 24 or 45, got %zu)", file->name,
                          rest);
-    for (size_t k = 0; k < FIXED_COLUMNS + rest; k++)
+    columns[FIXED_COLUMNS + rest] = ply_find_property(header, vertex, "filter_3D");
+    *has_filter = columns[FIXED_COLUMNS + rest] >= 0;
+    for (size_t k = 0; k < FIXED_COLUMNS + rest + *has_filter; k++)
         if (header->properties[e->first_property + (size_t)columns[k]].is_list)
             return base_fail(err, GBT_ERR_FORMAT, "%s: property %zu of the Gaussians is a list", file->name,
                              k);
@@ -101,7 +117,7 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
 {
     int columns[PLY_MAX_COLUMNS + 1];
     gaussian_rows rows = {.out = out};
-    GBT_TRY(find_columns(file, header, vertex, columns, &rows.rest_count, err));
+    GBT_TRY(find_columns(file, header, vertex, columns, &rows.rest_count, &rows.has_filter, err));
     /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
     const uint64_t row_count = header->elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
     if (row_count > (file->size - header->data_at) / least_bytes)
@@ -111,7 +127,8 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
     GBT_TRY(gaussian_cloud_alloc(out, (size_t)row_count, err));
     out->count = 0; /* of rows that are usable */
     out->sh_degree = degree_of(rows.rest_count);
-    return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count, add_row, &rows, err);
+    return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count + rows.has_filter,
+                         add_row, &rows, err);
 }
 
 /* 0 where nobody says, or no usable distance. */
@@ -185,7 +202,7 @@ static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_erro
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: cannot be read by parts (wanted a binary .ply that begins with its Gaussians)",
                          path);
-    GBT_TRY(find_columns(&head, header, vertex, out->columns, &out->rest_count, err));
+    GBT_TRY(find_columns(&head, header, vertex, out->columns, &out->rest_count, &out->has_filter, err));
     out->row_bytes = ply_row_bytes(header, vertex);
     const uint64_t rows = header->elements[vertex].count;
     if (rows > (out->file.size - header->data_at) / out->row_bytes)
@@ -237,11 +254,11 @@ gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size
     header.elements[0].count = count;
     header.data_at = 0;
     const source_file file = {parts->file.name, bytes, size};
-    part_rows part = {.rows = {out, parts->rest_count}, .kept = kept};
+    part_rows part = {.rows = {out, parts->rest_count, parts->has_filter}, .kept = kept};
     out->count = 0;
     out->sh_degree = parts->sh_degree;
-    return ply_read_rows(&file, &header, 0, parts->columns, FIXED_COLUMNS + parts->rest_count, add_part_row,
-                         &part, err);
+    return ply_read_rows(&file, &header, 0, parts->columns,
+                         FIXED_COLUMNS + parts->rest_count + parts->has_filter, add_part_row, &part, err);
 }
 
 void gaussian_ply_close(gaussian_ply_parts *parts)

@@ -32,7 +32,8 @@ static inline void gaussian_ply_put_near(sink *s, const gaussian_cloud *cloud)
  *
  * colour = max(0, 0.5 + sum sh_k Y_k). A row is dropped when a value is NaN or infinite; but an opacity logit
  * of +-inf is 1 or 0 and a log-scale of -inf is a flat axis, both as exporters write them. A log-scale above
- * GAUSSIAN_SCALE_LOG_LIMIT also drops the row.
+ * GAUSSIAN_SCALE_LOG_LIMIT also drops the row. filter_3D of Mip-Splatting, f, makes scales sqrt(s^2 + f^2),
+ * and opacities those of the same integral.
  *
  * @param out [out] free with gaussian_cloud_free(); zeroed on failure
  * @return GBT_OK; GBT_ERR_FORMAT also when no Gaussian remains; GBT_ERR_NO_MEMORY
@@ -55,6 +56,7 @@ typedef struct gaussian_ply_parts {
     ply_header header;
     int columns[PLY_MAX_COLUMNS + 1];
     size_t rest_count, row_bytes;
+    bool has_filter;
 } gaussian_ply_parts;
 
 /** GBT_OK; GBT_ERR_IO; GBT_ERR_FORMAT, also for files whose rows are not all of one size (ASCII, packed). */

@@ -93,20 +93,47 @@ static bool is_placed(const json_t *node)
            is_not(node, "scale", scale, 3);
 }
 
-/* The translation of the mesh's node, which is the cloud's origin. Other transformations are not read: those
-   of nodes with children may be the mesh's; the rest are cameras, lights and the like. */
-static gbt_status read_place(const reading *r, size_t mesh_index, double place[3], gbt_error *err)
+static bool has_mesh(const json_t *node, size_t mesh_index)
+{
+    const json_t *mesh = json_object_get(node, "mesh");
+    return json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
+}
+
+/* The mesh's nodes, and those that they are in. `parent` starts as [count] zeros. */
+static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, bool *matters)
+{
+    const size_t count = json_array_size(nodes);
+    const json_t *node, *child;
+    size_t i, k;
+    json_array_foreach(nodes, i, node)
+    {
+        json_array_foreach(json_object_get(node, "children"), k, child)
+        {
+            const json_int_t index = json_is_integer(child) ? json_integer_value(child) : -1;
+            if (index >= 0 && (uint64_t)index < count)
+                parent[index] = i + 1; /* 0: none */
+        }
+    }
+    json_array_foreach(nodes, i, node)
+    {
+        for (k = has_mesh(node, mesh_index) ? i + 1 : 0; k != 0 && !matters[k - 1]; k = parent[k - 1])
+            matters[k - 1] = true;
+    }
+}
+
+/* The translation of the mesh's node, which is the cloud's origin. Its other transformations, and those of
+   nodes that it is in, are not read; what is in neither are cameras, lights and the like. */
+static gbt_status place_of(const reading *r, const json_t *nodes, const bool *matters, size_t mesh_index,
+                           double place[3], gbt_error *err)
 {
     static const double nowhere[3] = {0, 0, 0};
-    const json_t *node, *nodes = json_object_get(r->root, "nodes");
+    const json_t *node;
     size_t i;
     json_array_foreach(nodes, i, node)
     {
-        const json_t *mesh = json_object_get(node, "mesh"),
-                     *translation = json_object_get(node, "translation");
-        const bool own = json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
-        const bool matters = own || json_array_size(json_object_get(node, "children")) > 0;
-        if (matters && (is_placed(node) || (!own && is_not(node, "translation", nowhere, 3))))
+        const json_t *translation = json_object_get(node, "translation");
+        const bool own = has_mesh(node, mesh_index);
+        if (matters[i] && (is_placed(node) || (!own && is_not(node, "translation", nowhere, 3))))
             return wrong(r, "nodes with a matrix, rotation or scale, or one in another, are not read", err);
         for (size_t k = 0; own && k < 3; k++)
             place[k] = json_number_value(json_array_get(translation, k));
@@ -114,6 +141,22 @@ static gbt_status read_place(const reading *r, size_t mesh_index, double place[3
             return wrong(r, "the node is too far away", err);
     }
     return GBT_OK;
+}
+
+static gbt_status read_place(const reading *r, size_t mesh_index, double place[3], gbt_error *err)
+{
+    const json_t *nodes = json_object_get(r->root, "nodes");
+    const size_t count = json_array_size(nodes);
+    size_t *parent = mem_calloc(count, sizeof *parent, "nodes", err);
+    bool *matters = mem_calloc(count, sizeof *matters, "nodes", err);
+    gbt_status status = parent != NULL && matters != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    if (status == GBT_OK) {
+        find_nodes(nodes, mesh_index, parent, matters);
+        status = place_of(r, nodes, matters, mesh_index, place, err);
+    }
+    mem_free(parent);
+    mem_free(matters);
+    return status;
 }
 
 /* ---- attributes ---- */

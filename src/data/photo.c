@@ -61,7 +61,7 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
 static gbt_status read_through(const image *stored, gbt_alpha kind, int width, int height, image *out,
                                gbt_error *err)
 {
-    if (stored->channels < 4 || kind == GBT_ALPHA_MASK)
+    if (kind == GBT_ALPHA_MASK || !image_is_transparent(stored))
         return GBT_OK;
     image at_stored;
     GBT_TRY(image_alloc(&at_stored, stored->width, stored->height, 1, err));

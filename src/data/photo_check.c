@@ -89,6 +89,7 @@ static void check_view(photo_check *c, scene_view *view)
         view->photo_width = h.width;
         view->has_alpha = h.has_alpha;
         view->is_exr = h.kind == IMAGE_EXR;
+        c->exr += view->is_exr;
         c->min_width = is_first || h.width < c->min_width ? h.width : c->min_width;
         c->min_height = is_first || h.height < c->min_height ? h.height : c->min_height;
         c->max_width = h.width > c->max_width ? h.width : c->max_width;
@@ -119,4 +120,6 @@ void photo_check_warn(const photo_check *check, const char *data)
     if (check->tiny > 0)
         log_warn("%s: photos with less than 1/%d of their camera's width or height: %zu", data,
                  (int)TINY_RATIO, check->tiny);
+    if (check->exr > 0)
+        log_warn("%s: EXR photos, which are used as they are, values above 1 cut: %zu", data, check->exr);
 }

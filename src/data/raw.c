@@ -48,6 +48,7 @@ void raw_free(raw_scene *raw)
     mem_free(raw->views);
     mem_free(raw->position);
     mem_free(raw->color);
+    mem_free(raw->missing_lines);
     memset(raw, 0, sizeof *raw);
 }
 
@@ -139,25 +140,25 @@ gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double 
     return GBT_OK;
 }
 
-gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err)
+gbt_status raw_check_name(const char *what, const char *name, size_t length, raw_place place, gbt_error *err)
 {
     if (length == 0)
-        return raw_fail(err, place, "image name is empty");
+        return raw_fail(err, place, "%s is empty", what);
     if (length > RAW_NAME_LIMIT)
-        return raw_fail(err, place, "image name is too long (wanted at most %d bytes, got %zu)",
-                        RAW_NAME_LIMIT, length);
+        return raw_fail(err, place, "%s is too long (wanted at most %d bytes, got %zu)", what, RAW_NAME_LIMIT,
+                        length);
     const int shown = length < 100 ? (int)length : 100;
     if (name[0] == '/')
-        return raw_fail(err, place, "image name is absolute (wanted a path inside the data set, got %.*s)",
+        return raw_fail(err, place, "%s is absolute (wanted a path inside the data set, got %.*s)", what,
                         shown, name);
     size_t part = 0;
     for (size_t i = 0; i <= length; i++) {
         if (i < length && ((unsigned char)name[i] < 0x20 || name[i] == 0x7f))
-            return raw_fail(err, place, "image name has a control character: %.*s", shown, name);
+            return raw_fail(err, place, "%s has a control character: %.*s", what, shown, name);
         if (i < length && name[i] != '/')
             continue;
         if (i - part == 2 && memcmp(name + part, "..", 2) == 0)
-            return raw_fail(err, place, "image name leaves the data set by '..': %.*s", shown, name);
+            return raw_fail(err, place, "%s leaves the data set by '..': %.*s", what, shown, name);
         part = i + 1;
     }
     return GBT_OK;
@@ -187,9 +188,15 @@ gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error
     return GBT_OK;
 }
 
-void raw_count_missing(raw_scene *raw, const char *name)
+gbt_status raw_count_missing(raw_scene *raw, const char *name, gbt_error *err)
 {
     enum { SHOWN = 3 };
+    const size_t length = strlen(name);
+    GBT_TRY(mem_reserve((void **)&raw->missing_lines, &raw->missing_capacity, raw->missing_bytes,
+                        raw->missing_bytes + length + 1, 1, "names", err));
+    memcpy(raw->missing_lines + raw->missing_bytes, name, length);
+    raw->missing_lines[raw->missing_bytes + length] = '\n';
+    raw->missing_bytes += length + 1;
     const size_t used = strlen(raw->missing_names);
     if (raw->photos_missing < SHOWN)
         snprintf(raw->missing_names + used, sizeof raw->missing_names - used, "%s%.60s", used > 0 ? ", " : "",
@@ -197,6 +204,7 @@ void raw_count_missing(raw_scene *raw, const char *name)
     else if (raw->photos_missing == SHOWN)
         snprintf(raw->missing_names + used, sizeof raw->missing_names - used, ", ...");
     raw->photos_missing++;
+    return GBT_OK;
 }
 
 static int by_name(const void *a, const void *b)

@@ -40,6 +40,8 @@ typedef struct raw_scene {
     bool has_split;            /* the data set says which views are held out */
     size_t angles_disagreeing; /* transforms.json cameras whose camera_angle_x contradicts fl_x (which wins)
                                 */
+    char *missing_lines; /* the names of all views left out, each ended by a new line; NULL: none; owned */
+    size_t missing_bytes, missing_capacity;
 } raw_scene;
 
 /** Larger coordinates mean nothing: a double keeps no tenth of a millimetre there, and float squares of them
@@ -84,14 +86,15 @@ gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3
     distances where the lens looks beside and behind itself, too. 0 where none is in front of the camera. */
 gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err);
 
-/** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. */
-gbt_status raw_check_name(const char *name, size_t length, raw_place place, gbt_error *err);
+/** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. `what` is
+    what messages call it. */
+gbt_status raw_check_name(const char *what, const char *name, size_t length, raw_place place, gbt_error *err);
 
 /** Size in 1..RAW_IMAGE_LIMIT, all parameters usable, focal lengths > 0. */
 gbt_status raw_check_camera(const gbt_camera *camera, raw_place place, gbt_error *err);
 
-/** Count a view whose photo is not there, and remember its name among the first. */
-void raw_count_missing(raw_scene *raw, const char *name);
+/** Count a view whose photo is not there, and remember its name. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status raw_count_missing(raw_scene *raw, const char *name, gbt_error *err);
 
 /** Two views of one name cannot be told apart later. Sorts the views by the bytes of their names, and ranks
     them. */

@@ -10,6 +10,8 @@
 #include "base/file.h"
 #include "base/memory.h"
 
+enum { REDUCED_MAX = 8 /* N of images_N; a larger number is no divisor */ };
+
 /* The text behind "key='", up to the next quote, of Python's Namespace(...). */
 static void find_text(const char *text, const char *key, char *out, size_t size)
 {
@@ -32,6 +34,19 @@ static void find_resolution(const char *text, result_folder *out)
     out->width = out->downscale == 0 && value > 0 && value <= 1 << 20 ? (int)value : 0;
 }
 
+/* images='images_N': photos that were divided by N before; a width stays as it is. */
+static void find_reduced_photos(const char *text, result_folder *out)
+{
+    static const char reduced[] = "images_";
+    char name[64] = "";
+    find_text(text, "images='", name, sizeof name);
+    if (strncmp(name, reduced, strlen(reduced)) != 0 || out->width > 0)
+        return;
+    const long n = strtol(name + strlen(reduced), NULL, 10);
+    if (n >= 1 && n <= REDUCED_MAX)
+        out->downscale = (out->downscale > 0 ? out->downscale : 1) * (double)n;
+}
+
 static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)
 {
     char path[RESULT_PATH_SIZE];
@@ -44,6 +59,7 @@ static gbt_status read_settings(const char *folder, result_folder *out, gbt_erro
     find_text((const char *)bytes, "source_path='", out->source, sizeof out->source);
     out->white_background = strstr((const char *)bytes, "white_background=True") != NULL;
     find_resolution((const char *)bytes, out);
+    find_reduced_photos((const char *)bytes, out);
     mem_free(bytes);
     return GBT_OK;
 }

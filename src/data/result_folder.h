@@ -16,7 +16,8 @@ typedef struct result_folder {
     unsigned long iteration;       /* N */
     char source[RESULT_PATH_SIZE]; /* cfg_args' source_path, the data set; empty when it does not say */
     bool white_background;         /* cfg_args */
-    double downscale;              /* cfg_args' resolution, of the data set's photos; 0: it does not say */
+    double downscale;              /* cfg_args' resolution and images_N, of the data set's photos; 0: it does
+                                      not say */
     int width;                     /* the same as the width that photos are brought to; 0: it is no width */
 } result_folder;
 

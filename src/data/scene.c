@@ -103,7 +103,7 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
     return status;
 }
 
-/* Adds views; points replace what is there. */
+/* Adds views; points, where there are none yet. */
 static gbt_status add_transforms(const char *path, const char *folder, bool may_be_empty, raw_scene *raw,
                                  gbt_error *err)
 {
@@ -357,6 +357,9 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     out->photos_missing = raw->photos_missing;
     out->file_bytes = raw->file_bytes;
     memcpy(out->missing_names, raw->missing_names, sizeof out->missing_names);
+    out->missing_lines = raw->missing_lines;
+    out->missing_bytes = raw->missing_bytes;
+    raw->missing_lines = NULL;
     out->has_split = raw->has_split;
     return GBT_OK;
 }
@@ -444,6 +447,7 @@ void scene_free(scene *s)
         scene_view_free(&s->views[i]);
     mem_free(s->folder);
     mem_free(s->held_out_list);
+    mem_free(s->missing_lines);
     mem_free(s->views);
     mem_free(s->points.position);
     mem_free(s->points.color);

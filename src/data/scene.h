@@ -59,6 +59,8 @@ typedef struct scene {
     bool has_split;          /* the data set itself says which views are held out */
     char *held_out_list; /* [held_out_bytes] SCENE_SPLIT_LIST: the list as it was read; else NULL; owned */
     size_t held_out_bytes;
+    char *missing_lines; /* [missing_bytes] names of all views left out, each ended by a new line; owned */
+    size_t missing_bytes;
 } scene;
 
 typedef enum scene_split_kind {
@@ -123,8 +125,8 @@ static inline void scene_view_free(scene_view *view)
 void scene_set_alpha(scene *s, gbt_alpha alpha);
 
 /**
- * What is behind everything, when a training photo has an alpha channel and lies on a colour: true, and the
- * colour. Cost: opens every training photo.
+ * What is behind everything, when a training photo is transparent in places and lies on a colour: true, and
+ * the colour. Cost: opens every training photo, reads up to four with an alpha channel.
  */
 bool scene_background(const scene *s, float color[3]);
 
@@ -150,8 +152,8 @@ gbt_status scene_read_photo_valid(const scene_view *view, int width, int height,
 /**
  * scene_read_photo_valid(), and what of the photo's alpha channel lies on a colour.
  *
- * @param through [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are opaque
- * by the file's format, or alpha is a mask; free with image_free()
+ * @param through [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are
+ * opaque, or alpha is a mask; free with image_free()
  */
 gbt_status scene_read_photo_through(const scene_view *view, int width, int height, image *out,
                                     unsigned char **valid, image *through, gbt_error *err);

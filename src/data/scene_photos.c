@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/image.h"
 #include "base/image_header.h"
 #include "base/memory.h"
 #include "data/scene.h"
@@ -62,8 +63,8 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     for (size_t i = 0; i < raw->view_count && status == GBT_OK; i++) {
         raw_view view = raw->views[i];
         status = find_files(folder, images, raw->has_masks ? masks : NULL, &view, err);
-        if (view.path == NULL)
-            raw_count_missing(raw, view.name);
+        if (status == GBT_OK && view.path == NULL)
+            status = raw_count_missing(raw, view.name, err);
         raw->views[i] = raw->views[kept]; /* what is left out goes behind, where raw_free() finds it */
         raw->views[kept] = view;
         kept += view.path != NULL;
@@ -80,6 +81,9 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
 
 /* ---- what is transparent ---- */
 
+/* Photos that are cut out are so one and all, and reading hundreds that are opaque would take long. */
+enum { LOOKED_AT_MAX = 4 };
+
 void scene_set_alpha(scene *s, gbt_alpha alpha)
 {
     if (alpha == GBT_ALPHA_AUTO)
@@ -88,17 +92,32 @@ void scene_set_alpha(scene *s, gbt_alpha alpha)
         s->views[i].alpha = alpha;
 }
 
+static bool is_cut_out(const char *path)
+{
+    image photo;
+    if (image_read(path, &photo, NULL) != GBT_OK)
+        return false;
+    const bool found = image_is_transparent(&photo);
+    image_free(&photo);
+    return found;
+}
+
 bool scene_background(const scene *s, float color[3])
 {
-    for (size_t i = 0; i < s->view_count; i++) {
+    size_t looked_at = 0;
+    for (size_t i = 0, next = 0; i < s->view_count && looked_at < LOOKED_AT_MAX; i++) {
         const scene_view *view = &s->views[i];
         image_header header;
-        if (view->is_test || view->alpha == GBT_ALPHA_MASK ||
+        if (i < next || view->is_test || view->alpha == GBT_ALPHA_MASK ||
             image_header_read(view->path, &header, NULL) != GBT_OK || !header.has_alpha)
             continue;
-        for (int c = 0; c < 3; c++)
-            color[c] = view->alpha == GBT_ALPHA_WHITE;
-        return true;
+        if (is_cut_out(view->path)) {
+            for (int c = 0; c < 3; c++)
+                color[c] = view->alpha == GBT_ALPHA_WHITE;
+            return true;
+        }
+        looked_at++;
+        next = i + s->view_count / LOOKED_AT_MAX;
     }
     return false;
 }

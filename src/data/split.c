@@ -8,6 +8,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "data/number.h"
 
@@ -68,11 +69,25 @@ static int name_against_view(const void *name, const void *view)
     return strcmp(name, ((const scene_view *)view)->name);
 }
 
+/* Of a view that was left out because its photo is missing. */
+static bool is_missing(const scene *s, const char *name)
+{
+    const size_t length = strlen(name);
+    for (size_t at = 0, end; at < s->missing_bytes; at = end + 1) {
+        const char *line = s->missing_lines + at;
+        end = at + (size_t)((const char *)memchr(line, '\n', s->missing_bytes - at) - line);
+        if (end - at == length && memcmp(line, name, length) == 0)
+            return true;
+    }
+    return false;
+}
+
 /* `bytes` are changed: every line becomes a string of its own. */
 static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *path, gbt_error *err)
 {
-    size_t line = 0;
-    for (char *at = bytes; at < bytes + size;) {
+    size_t line = 0, missing = 0;
+    const bool has_mark = size >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0; /* of UTF-8 */
+    for (char *at = bytes + (has_mark ? 3 : 0); at < bytes + size;) {
         char *end = memchr(at, '\n', (size_t)(bytes + size - at));
         end = end != NULL ? end : bytes + size;
         char *next = end + 1;
@@ -84,13 +99,17 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
             scene_view *view = s->view_count > 0
                                    ? bsearch(at, s->views, s->view_count, sizeof *s->views, name_against_view)
                                    : NULL;
-            if (view == NULL)
+            if (view == NULL && !is_missing(s, at))
                 return base_fail(err, GBT_ERR_FORMAT,
                                  "%s:%zu: no image of the data set has this name: %.200s", path, line, at);
-            view->is_test = true;
+            if (view != NULL)
+                view->is_test = true;
+            missing += view == NULL;
         }
         at = next;
     }
+    if (missing > 0)
+        log_warn("%s: names of photos that are missing, passed over: %zu", path, missing);
     return GBT_OK;
 }
 

@@ -43,19 +43,19 @@ static gbt_status find_file(const char *folder, const char *name, const char *co
 
 /* The file that is `written`, or else the same with slashes for backslashes: here these are a letter like any
    other. `name` is as it was found; `path` is of the last that was tried. */
-static gbt_status find_named(raw_place place, const char *folder, const char *written,
+static gbt_status find_named(raw_place place, const char *what, const char *folder, const char *written,
                              const char *const *endings, char name[NAME_SIZE], char path[PATH_SIZE],
                              bool *found, gbt_error *err)
 {
     char other[NAME_SIZE];
     written = plain_name(written);
-    GBT_TRY(raw_check_name(written, strlen(written), place, err));
+    GBT_TRY(raw_check_name(what, written, strlen(written), place, err));
     memcpy(name, written, strlen(written) + 1);
     GBT_TRY(find_file(folder, name, endings, path, found, err));
     if (*found || strchr(name, '\\') == NULL)
         return GBT_OK;
     const char *slashed = with_slashes(name, other);
-    GBT_TRY(raw_check_name(slashed, strlen(slashed), place, err));
+    GBT_TRY(raw_check_name(what, slashed, strlen(slashed), place, err));
     GBT_TRY(find_file(folder, slashed, endings, path, found, err));
     if (*found)
         memcpy(name, slashed, strlen(slashed) + 1);
@@ -75,7 +75,7 @@ static gbt_status find_mask(const transforms_frame *s, const char *folder, char 
         return transforms_fail(s, err, "wanted a string", "mask_path");
     char name[NAME_SIZE], path[PATH_SIZE];
     bool found;
-    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, folder,
+    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, "mask_path", folder,
                        json_string_value(value), as_it_is, name, path, &found, err));
     if (!found)
         return base_fail(err, GBT_ERR_IO, "%s: frame %zu: mask is missing: %.200s", s->file->name,
@@ -93,12 +93,10 @@ static gbt_status read_frame(const transforms_frame *s, const char *folder, raw_
     bool found;
     gbt_camera camera = {0};
     GBT_TRY(transforms_pose(s, &camera, err));
-    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, folder,
+    GBT_TRY(find_named((raw_place){s->file->name, RAW_MARK_FRAME, s->frame_index}, "image name", folder,
                        json_string_value(value), photo_endings, name, path, &found, err));
-    if (!found) {
-        raw_count_missing(out, name);
-        return GBT_OK;
-    }
+    if (!found)
+        return raw_count_missing(out, name, err);
     GBT_TRY(transforms_camera(s, path, &camera, out, err));
     char *mask;
     GBT_TRY(find_mask(s, folder, &mask, err));
@@ -170,8 +168,8 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
         return base_fail(err, GBT_ERR_FORMAT, "%s: ply_file_path: wanted a string", file->name);
     char name[NAME_SIZE], path[PATH_SIZE];
     bool found;
-    GBT_TRY(find_named((raw_place){file->name, ':', 1}, folder, json_string_value(points), as_it_is, name,
-                       path, &found, err));
+    GBT_TRY(find_named((raw_place){file->name, RAW_MARK_FILE, 0}, "ply_file_path", folder,
+                       json_string_value(points), as_it_is, name, path, &found, err));
     *points_name = raw_copy_text(name, strlen(name), err);
     return *points_name != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* io/container.h -- one file format for everything that we save: named, typed, checksummed arrays.
 
-   Layout (little endian; docs/formats.md): a 64-byte header, a table of 128 bytes per section, then the
+   Layout (little endian; io/container_format.h): a 64-byte header, a table of 128 bytes per section, then the
    sections, each on a multiple of 64 bytes, in table order, zeros between. The layout follows from the table
    alone and every byte is under a checksum or must be zero, so any changed byte, cut or appended file is
    found. */

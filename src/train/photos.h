@@ -26,7 +26,7 @@ typedef struct photos {
     unsigned char **full_valid,
         **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
     unsigned char **through; /* [view_count] how transparent each pixel at level 0 is, 255: wholly; NULL for a
-                                photo without an alpha channel, or whose alpha channel is a mask */
+                                photo that is opaque, or whose alpha channel is a mask */
     unsigned char *sample_valid; /* of the last photos_get_sample(), when it picked pixels */
     size_t sample_valid_capacity;
 } photos;

@@ -94,6 +94,8 @@ report $? "and writes its model" "$(cat err)"
     grep -q '^{"schema": 1, "width": 32, "height": 24, "psnr": [0-9.]*, "ssim": [0-9.]*, "ssim_interior": [0-9.]*, "flip": [0-9.e-]*}$' scores &&
     [ "$(sed 's/.*"psnr": \([0-9]*\).*/\1/' scores)" -ge 90 ]
 report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat scores)"
+mkdir floats && cp -r made/* floats && cp shown/0000.exr floats/images/0001.png &&
+    holds "EXR photos are told" 0 '^warning: floats: EXR photos, which are used as they are, values above 1 cut: 1$' train floats -o floats/run --iterations 3
 "$program" train made -o splats --renderer raster --iterations 3 --quiet >out 2>err && ! "$program" render splats -o none --outputs depth >>out 2>>err &&
     "$program" render splats -o splats-exact --renderer reference --outputs depth >>out 2>>err && [ -s splats-exact/0000.depth.exr ]
 report $? "the reference, and depth beside it, of a model of splats" "$(cat err out; ls splats-exact)"
@@ -117,6 +119,9 @@ report $? "a result folder within a memory limit" "$(cat err out)"
 sed -i 's/resolution=1/resolution=2/' result/cfg_args && "$program" render result -o half --format exr >out 2>err && "$program" render result -o asked --format exr -d 1 >>out 2>>err &&
     "$program" compare whole/*0.exr asked/*0.exr >>out 2>>err && ! "$program" compare whole/*0.exr half/*0.exr >>out 2>>err && grep -q '16 x 12' err
 report $? "a result folder of photos at half size" "$(cat err out)"
+sed -i "s/images='images'/images='images_2'/; s/resolution=2/resolution=-1/" result/cfg_args && "$program" render result -o reduced --format exr >out 2>err && "$program" render result -o divided --format exr -d 2 >>out 2>>err &&
+    grep -q "images='images_2'.*resolution=-1" result/cfg_args && "$program" compare divided/*0.exr reduced/*0.exr >>out 2>>err
+report $? "a result folder of photos that were divided before" "$(cat err out result/cfg_args)"
 "$program" train made -o three-quarters --iterations 3 --downscale 1.33333 --quiet >out 2>err && "$program" export three-quarters narrow/ --refine 0 >>out 2>>err &&
     grep -q 'resolution=24, ' narrow/cfg_args && grep -q '"width": 24,' narrow/cameras.json && "$program" render narrow -o narrow-drawn >>out 2>>err &&
     "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png --json | grep -q '"width": 24, "height": 18, "psnr": 100,'

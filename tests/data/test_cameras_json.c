@@ -79,11 +79,18 @@ static void newest_iteration(void **state)
     assert_true(is_there && found.iteration == 30000 && found.white_background);
     assert_string_equal(found.source, "/data/a b");
     assert_true(found.downscale == 0);
-    static const char *const resolutions[] = {"resolution=4, ", "resolution=-1, ", "resolution=1200, ",
-                                              "resolution=1)"};
-    static const double downscales[] = {4, 0, 0, 1};
-    static const int widths[] = {0, 0, 1200, 0};
-    for (int i = 0; i < 4; i++) {
+    static const char *const resolutions[] = {"resolution=4, ",
+                                              "resolution=-1, ",
+                                              "resolution=1200, ",
+                                              "resolution=1)",
+                                              "images='images', resolution=-1)",
+                                              "images='images_4', resolution=-1)",
+                                              "images='images_4', resolution=2)",
+                                              "images='images_4', resolution=1200)",
+                                              "images='images_2024', resolution=-1)"};
+    static const double downscales[] = {4, 0, 0, 1, 0, 4, 8, 0, 0};
+    static const int widths[] = {0, 0, 1200, 0, 0, 0, 0, 1200, 0};
+    for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
         write_text(folder, "cfg_args", resolutions[i]);
         assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
         assert_true(found.downscale == downscales[i] && found.width == widths[i]);

@@ -268,7 +268,12 @@ static void glb_nodes_of_others(void **state)
                 {"{\"children\":[0],\"translation\":[0,0,1]}", false},
                 {"{\"children\":[0],\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,1,1]}", false},
                 {"{\"children\":[0],\"rotation\":[0,1,0,0]}", false},
-                {"{\"children\":[0],\"scale\":[1,1,2]}", false}};
+                {"{\"children\":[0],\"scale\":[1,1,2]}", false},
+                /* Of three nodes: beside the Gaussians, and above them. */
+                {"{\"children\":[2],\"rotation\":[0,1,0,0]},{\"camera\":0}", true},
+                {"{\"children\":[0]},{\"children\":[1],\"rotation\":[0,1,0,0]}", false},
+                {"{\"children\":[2,-1,7,\"0\"]},{\"children\":[1],\"scale\":[2,2,2]}", true},
+                {"{\"children\":[0,2]},{\"children\":[1]}", true}};
     gaussian_cloud a, b;
     make_cloud(&a, 5, 0);
     assert_ok(gaussian_file_write(inside(*state, "n.glb", 0), &a, nowhere, &assert_ok_err_));

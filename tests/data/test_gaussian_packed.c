@@ -3,6 +3,7 @@
    bytes, damaged files. */
 #include <zlib.h>
 
+#include "data/archive.h"
 #include "data/gaussian_file.h"
 #include "data/gaussian_formats.h"
 #include "data/gaussian_order.h"
@@ -501,6 +502,30 @@ static void check_damage(const char *path, const gaussian_format *format, size_t
     mem_free(bytes);
 }
 
+/* Bundles that are whole, of a meta.json that is wrong. */
+static void sog_meta_that_is_wrong(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *meta, *says;
+    } rows[] = {{"{\"version\":1,\"count\":1}", "meta.json: not of version 2"},
+                {"{\"version\":2,\"count\":1000000}", "1000000 Gaussians cannot be in"},
+                {"{\"version\":2,\"count\":0}", "0 Gaussians cannot be in"},
+                {"{\"version\":2,\"count\":1}", "meta.json: means.mins is no list of 3 numbers"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const archive_member meta = {"meta.json", rows[i].meta, strlen(rows[i].meta)};
+        sink s = {0};
+        assert_ok(archive_put(&s, "a.sog", &meta, 1, 1, &assert_ok_err_));
+        const source_file file = {"a.sog", s.bytes, s.size};
+        gaussian_cloud cloud;
+        gbt_error err = {0};
+        assert_int_equal(gaussian_format_sog.read(&file, &cloud, &err), GBT_ERR_FORMAT);
+        if (strstr(err.text, rows[i].says) == NULL)
+            fail_msg("wanted \"%s\", got: %s", rows[i].says, err.text);
+        sink_free(&s);
+    }
+}
+
 static void damaged_bundles(void **state)
 {
     gaussian_cloud a;
@@ -534,6 +559,7 @@ int main(void)
         cmocka_unit_test(palette_entries_are_means),
         cmocka_unit_test_setup_teardown(damaged_files, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(damaged_bundles, make_temporary, remove_temporary),
+        cmocka_unit_test(sog_meta_that_is_wrong),
         cmocka_unit_test(older_compressed_ply),
         cmocka_unit_test(far_ones_are_apart),
     };

@@ -158,6 +158,48 @@ static void rows(void **state)
     gaussian_cloud_free(&cloud);
 }
 
+/* filter_3D of Mip-Splatting: 1, none, and one that is no number; whole and by parts. */
+static void filter_is_part_of_a_scale(void **state)
+{
+    enum { ROWS = 3, COLUMNS = 15 };
+    static const char *const names[COLUMNS] = {"filter_3D", "x",      "y",       "z",       "f_dc_0",
+                                               "f_dc_1",    "f_dc_2", "opacity", "scale_0", "scale_1",
+                                               "scale_2",   "rot_0",  "rot_1",   "rot_2",   "rot_3"};
+    static const float filters[ROWS] = {1, 0, NAN};
+    sink s = {0};
+    sink_put_text(&s, "ply\nformat binary_little_endian 1.0\nelement vertex 3\n");
+    for (int k = 0; k < COLUMNS; k++) {
+        sink_put_text(&s, "property float ");
+        sink_put_text(&s, names[k]);
+        sink_put_text(&s, "\n");
+    }
+    sink_put_text(&s, "end_header\n");
+    for (int i = 0; i < ROWS; i++)
+        for (int k = 0; k < COLUMNS; k++)
+            sink_put_f32(&s, k == 0 ? filters[i] : strcmp(names[k], "rot_0") == 0 ? 1 : 0);
+    write_bytes(*state, "f.ply", s.bytes, s.size);
+    sink_free(&s);
+    gaussian_cloud whole, part;
+    assert_ok(gaussian_ply_load(inside(*state, "f.ply", 0), &whole, &assert_ok_err_));
+    gaussian_ply_parts parts;
+    assert_ok(gaussian_ply_open(inside(*state, "f.ply", 0), &parts, &assert_ok_err_));
+    assert_ok(gaussian_cloud_alloc(&part, ROWS, &assert_ok_err_));
+    unsigned char bytes[ROWS * COLUMNS * sizeof(float)];
+    uint32_t kept[ROWS];
+    assert_ok(gaussian_ply_part(&parts, 0, ROWS, bytes, &part, kept, &assert_ok_err_));
+    const gaussian_cloud *const clouds[] = {&whole, &part};
+    for (int i = 0; i < 2; i++) {
+        const gaussian_cloud *c = clouds[i];
+        assert_true(c->count == 2 && c->dropped == 1);
+        assert_true(fabs((double)c->opacity[0] - 0.5 / sqrt(8)) < 1e-7 && c->opacity[1] == 0.5f);
+        for (int k = 0; k < 3; k++)
+            assert_true(fabs((double)c->scale_log[k] - 0.5 * log(2)) < 1e-7 && c->scale_log[3 + k] == 0);
+    }
+    gaussian_ply_close(&parts);
+    gaussian_cloud_free(&whole);
+    gaussian_cloud_free(&part);
+}
+
 static void refused(sink *s, const char *says)
 {
     gaussian_cloud cloud;
@@ -329,6 +371,7 @@ int main(void)
             (struct CMUnitTest){.name = row_cases[i].name, .test_func = rows, .initial_state = &row_cases[i]};
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(layout_of_each_degree),
+        cmocka_unit_test_setup_teardown(filter_is_part_of_a_scale, make_temporary, remove_temporary),
         cmocka_unit_test(missing_properties),
         cmocka_unit_test(wrong_counts_of_rest),
         cmocka_unit_test(other_files),

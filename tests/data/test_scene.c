@@ -221,6 +221,12 @@ static void missing_photos(void **state)
 
 static void keep_text(const gbt_event *event, void *text) { snprintf(text, 300, "%s", event->text); }
 
+static void keep_first(const gbt_event *event, void *text)
+{
+    if (*(const char *)text == '\0')
+        keep_text(event, text);
+}
+
 /* COLMAP's NAME.png, and two other habits; what has none stays without, and a warning counts it. */
 static void masks_are_found(void **state)
 {
@@ -428,6 +434,33 @@ static void validation_leaves_held_out_photos_alone(void **state)
     assert_non_null(strstr(none.text, "validation holds out none"));
 }
 
+/* Photos that were held out and are gone; a name that no view ever had is still an error. */
+static void missing_photos_on_a_list(void **state)
+{
+    const char *folder = *state;
+    char list[4096], text[300] = "";
+    snprintf(list, sizeof list, "%s/list.txt", folder);
+    const scene_split by_list = {.kind = SCENE_SPLIT_LIST, .list_path = list};
+    write_model(folder, false, true);
+    unlink(inside(folder, "images/v2.png", 0));
+    unlink(inside(folder, "images/v5.png", 0));
+    write_text(folder, "list.txt", "v5.png\nv9.png\nv2.png\n");
+    scene s;
+    gbt_listen(keep_first, text);
+    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
+    gbt_listen(NULL, NULL);
+    assert_non_null(strstr(text, "list.txt: names of photos that are missing, passed over: 2"));
+    assert_true(s.view_count == VIEW_COUNT - 2 && count_tests(&s) == 1 && s.views[6].is_test);
+    scene_free(&s);
+    static const char *const bad[] = {"v5.png\nv22.png\n", "v5.png\nv\n", "v5.png\nv2.pn\n"};
+    for (size_t i = 0; i < 3; i++) {
+        gbt_error err = {0};
+        write_text(folder, "list.txt", bad[i]);
+        assert_int_equal(scene_load(folder, &by_list, &s, &err), GBT_ERR_FORMAT);
+        assert_non_null(strstr(err.text, "list.txt:2: no image of the data set has this name"));
+    }
+}
+
 static void splits(void **state)
 {
     const char *folder = *state;
@@ -452,6 +485,10 @@ static void splits(void **state)
     assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 2);
     assert_true(s.views[1].is_test && s.views[8].is_test);
+    scene_free(&s);
+    write_text(folder, "list.txt", "\xef\xbb\xbfv9.png\n");
+    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
+    assert_true(count_tests(&s) == 1 && s.views[8].is_test);
     scene_free(&s);
     static const struct {
         const char *text;
@@ -591,7 +628,7 @@ static void no_memory(void **state)
 {
     const char *folder = *state;
     write_model(folder, false, false);
-    for (int i = 1; i <= VIEW_COUNT; i++) {
+    for (int i = 2; i <= VIEW_COUNT; i++) { /* the first is missing */
         char name[32];
         snprintf(name, sizeof name, "images/v%d.png", i);
         write_text(folder, name, "not read here");
@@ -1207,6 +1244,7 @@ int main(void)
         cmocka_unit_test(too_long_path),
         cmocka_unit_test(parse_split),
         cmocka_unit_test_setup_teardown(splits, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(missing_photos_on_a_list, make_temporary, remove_temporary),
         cmocka_unit_test_setup_teardown(validation_leaves_held_out_photos_alone, make_temporary,
                                         remove_temporary),
         cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),

@@ -450,35 +450,50 @@ static void alpha_is_what_it_is_said_to_be(void **state)
                 "alpha: 7 (wanted auto, black, white or mask)");
 }
 
+/* With an alpha channel that says nothing. */
+static void make_opaque(image *photo, size_t view)
+{
+    cut_out(photo, view);
+    for (int i = 0; i < photo->width * photo->height; i++)
+        photo->pixels[4 * i + 3] = 1;
+}
+
+static void cut_out_later(image *photo, size_t view) { (view < 2 ? make_opaque : cut_out)(photo, view); }
+
 static void keep_warning(const gbt_event *event, void *context)
 {
     if (event->kind == GBT_EVENT_WARNING)
         snprintf(context, PATH_SIZE, "%s", event->text);
 }
 
-/* A sky that was asked for and that nothing would show. */
+/* A sky that was asked for and that nothing would show. Photos whose alpha channel is opaque do show it. */
 static void a_sky_that_is_not_learned_is_told(void **state)
 {
     (void)state;
-    const char *cut = in_root("sky");
-    make_tiny_scene(cut);
-    change_photos(cut, cut_out);
     static const struct {
-        bool has_alpha, compat;
+        void (*change)(image *photo, size_t view);
+        bool compat;
         const char *says;
-    } cases[] = {{false, false, NULL},
-                 {true, false, "no sky is learned: photos with an alpha channel lie on one colour"},
-                 {false, true, "no sky is learned: compat has one colour"}};
+    } cases[] = {{NULL, false, NULL},
+                 {make_opaque, false, NULL},
+                 {cut_out, false, "no sky is learned: photos with an alpha channel lie on one colour"},
+                 {cut_out_later, false, "no sky is learned: photos with an alpha channel lie on one colour"},
+                 {NULL, true, "no sky is learned: compat has one colour"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char warning[PATH_SIZE] = "";
         gbt_train_def def = run_def();
         def.background = GBT_BACKGROUND_SKY;
         def.compat = cases[i].compat;
         trainer t;
+        const char *folder = in_root("sky_%d", (int)i);
+        make_tiny_scene(folder);
+        if (cases[i].change != NULL)
+            change_photos(folder, cases[i].change);
         gbt_listen(keep_warning, warning);
-        open_ok(&t, cases[i].has_alpha ? cut : tiny, &def);
+        open_ok(&t, folder, &def);
         be_quiet();
         assert_int_equal(t.settings.sky.varies, cases[i].says == NULL);
+        assert_int_equal(t.photos.through[t.train_views[0]] != NULL, cases[i].change == cut_out);
         if (cases[i].says == NULL)
             assert_string_equal(warning, "");
         else

@@ -180,7 +180,7 @@ static void filter_is_part_of_a_scale(void **state)
     write_bytes(*state, "f.ply", s.bytes, s.size);
     sink_free(&s);
     gaussian_cloud whole, part;
-    assert_ok(gaussian_ply_load(inside(*state, "f.ply", 0), &whole, &assert_ok_err_));
+    assert_ok(gaussian_file_read(inside(*state, "f.ply", 0), &whole, &assert_ok_err_));
     gaussian_ply_parts parts;
     assert_ok(gaussian_ply_open(inside(*state, "f.ply", 0), &parts, &assert_ok_err_));
     assert_ok(gaussian_cloud_alloc(&part, ROWS, &assert_ok_err_));

@@ -38,7 +38,7 @@ static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_s
         *hint = '\0';
     if (run->cloud.count == 0)
         snprintf(note, note_size, "No photos: %.500s%s", first.text,
-                 hint != NULL ? "; gbtrace view --data says where it is now" : "");
+                 hint != NULL ? "; where it is now can be said when the viewer is started" : "");
     return GBT_OK;
 }
 

@@ -15,7 +15,7 @@ typedef struct run_paths {
 } run_paths;
 
 /** Write all of them. */
-gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err);
+gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A save that is written while steps go on: of a copy of all that changes. Start from {0}. */
 typedef struct save_beside {
@@ -31,7 +31,7 @@ typedef struct save_beside {
  * Begin one; `paths` are borrowed until save_finish(). Without memory for the copy it is done when this
  * returns. None may be under way: save_finish() first.
  */
-gbt_status save_begin(save_beside *s, const trainer *t, const run_paths *paths, gbt_error *err);
+gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err);
 
 /** Still being written? */
 bool save_is_under_way(save_beside *s);

@@ -68,33 +68,25 @@ typedef struct gbt_comparison {
     double ssim;          /* as everywhere here: every pixel counts, windows see 0 beyond the border */
     double ssim_interior; /* over the windows that lie wholly inside; NaN below 11 x 11 pixels */
     double flip;          /* at 67.02 pixels per degree */
+    double lpips;         /* of colours in [-1, 1], as the network was trained; NaN without a network */
+    double lpips_01;      /* of colours in [0, 1], as the scores of 3DGS are made; likewise */
 } gbt_comparison;
 
 /**
  * Compare two image files of one size (PNG, JPEG, EXR; alpha is left out), rounded to 8 bit; `reference` is
  * the original.
  *
- * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ), GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @param network [in] .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score
+ * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ, or too small for the network), GBT_ERR_IO, GBT_ERR_FORMAT,
+ *         GBT_ERR_NO_MEMORY
  *
  * Threads: any, with distinct `out`.
  */
-gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err);
+gbt_status gbt_compare_images(const char *path, const char *reference, const char *network,
+                              gbt_comparison *out, gbt_error *err);
 
 /**
- * LPIPS of two image files, as gbt_compare_images() reads them, for the network in a .safetensors file
- * (docs/metrics.md).
- *
- * @param out [out] of colours in [-1, 1], as the network was trained; and in [0, 1], as the scores of 3DGS
- *                  are made
- * @return as gbt_compare_images(); GBT_ERR_ARGUMENT also when the pictures are too small for the network
- *
- * Threads: any, with distinct `out`.
- */
-gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2],
-                             gbt_error *err);
-
-/**
- * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit.
+ * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit; without LPIPS.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
  *

@@ -20,7 +20,7 @@ typedef struct gbt_init_def {
     gbt_scale_prior scale_prior; /* of GBT_INIT_GB; the others use GBT_SCALE_PRIOR_NN. Default
                                     GBT_SCALE_PRIOR_GB */
     int max_depth;               /* D_max of the balls, [0, 64]. Default 18 */
-    float voxel_size;            /* v, scene units; 0: from the points by `voxel_rule`. Default 0 */
+    float voxel_size;            /* v, scene units, [0, 1e9]; 0: from the points by `voxel_rule`. Default 0 */
     gbt_voxel_rule voxel_rule;   /* default GBT_VOXEL_RULE_MEDIAN */
     bool mesh;                   /* an icosphere per ball in place of one vertex. Default false */
     uint32_t cookie_;            /* set by gbt_init_def_default() */

@@ -68,7 +68,8 @@ class CPicture(c.Structure):
 
 
 class CComparison(c.Structure):
-    _fields_ = [("width", c.c_int), ("height", c.c_int), ("psnr", c.c_double), ("ssim", c.c_double), ("ssim_interior", c.c_double), ("flip", c.c_double)]
+    _fields_ = [("width", c.c_int), ("height", c.c_int), ("psnr", c.c_double), ("ssim", c.c_double), ("ssim_interior", c.c_double), ("flip", c.c_double),
+                ("lpips", c.c_double), ("lpips_01", c.c_double)]
 
 
 class CEvaluateDef(c.Structure):
@@ -134,7 +135,7 @@ FUNCTIONS = {
     "gbt_evaluate": ("status", [text, c.POINTER(CEvaluateDef)]),
     "gbt_export_def_default": (CExportDef, []),
     "gbt_export": ("status", [text, c.POINTER(CExportDef), c.POINTER(text), number, pointer]),
-    "gbt_compare_images": ("status", [text, text, c.POINTER(CComparison)]),
+    "gbt_compare_images": ("status", [text, text, text, c.POINTER(CComparison)]),
     "gbt_compare_pictures": ("status", [pointer, pointer, c.c_int, c.c_int, c.POINTER(CComparison)]),
 }
 

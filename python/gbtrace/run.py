@@ -72,5 +72,5 @@ def compare(picture, reference):
         lib.call("gbt_compare_pictures", lib.address(picture, "picture", (height, width, 3)), lib.address(reference, "reference", (height, width, 3)),
                  width, height, c.byref(out))
     else:
-        lib.call("gbt_compare_images", lib.encode(picture), lib.encode(reference), c.byref(out))
+        lib.call("gbt_compare_images", lib.encode(picture), lib.encode(reference), None, c.byref(out))
     return Comparison(out.psnr, out.ssim, out.ssim_interior, out.flip)

@@ -164,30 +164,23 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, fl
 static void solve_color(const baking *b, const sums *s, float *sh)
 {
     const int n = b->functions;
-    double m[TERMS * TERMS] = {0}, l[TERMS * TERMS], trace = 0;
+    double m[TERMS * TERMS] = {0}, trace = 0;
     for (int k = 0, at = 0; k < n; k++)
         for (int j = 0; j <= k; j++, at++)
-            m[k * n + j] = m[j * n + k] = s->normal[at];
+            m[k * n + j] = s->normal[at];
     for (int k = 0; k < n; k++)
         trace += m[k * n + k];
     for (int k = 0; k < n; k++)
         m[k * n + k] += ridge * trace / n;
-    symmetric_cholesky(m, l, n, 1e-12 * trace);
+    symmetric_cholesky(m, m, n, 1e-12 * trace);
     memset(sh, 0, TERMS * 3 * sizeof *sh);
     for (int c = 0; c < 3; c++) {
         double x[TERMS];
-        for (int k = 0; k < n; k++) {
+        for (int k = 0; k < n; k++)
             x[k] = s->color[k][c];
-            for (int j = 0; j < k; j++)
-                x[k] -= l[k * n + j] * x[j];
-            x[k] /= l[k * n + k];
-        }
-        for (int k = n; k-- > 0;) {
-            for (int j = k + 1; j < n; j++)
-                x[k] -= l[j * n + k] * x[j];
-            x[k] /= l[k * n + k];
+        symmetric_solve(m, x, n);
+        for (int k = 0; k < n; k++)
             sh[3 * k + c] = (float)x[k];
-        }
     }
 }
 

@@ -3,7 +3,6 @@
 #include "base/symmetric.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { SWEEPS_MAX = 60 /* convergence is quadratic; the bound only states that the loop ends */ };
 
@@ -57,12 +56,28 @@ void symmetric_eigen(double *a, double *v, int n, double small)
 
 void symmetric_cholesky(const double *m, double *l, int n, double least)
 {
-    memset(l, 0, (size_t)(n * n) * sizeof *l);
-    for (int i = 0; i < n; i++)
+    for (int i = 0; i < n; i++) {
         for (int j = 0; j <= i; j++) {
             double value = m[i * n + j];
             for (int k = 0; k < j; k++)
                 value -= l[i * n + k] * l[j * n + k];
             l[i * n + j] = i == j ? sqrt(fmax(value, least)) : value / l[j * n + j];
         }
+        for (int j = i + 1; j < n; j++)
+            l[i * n + j] = 0;
+    }
+}
+
+void symmetric_solve(const double *l, double *x, int n)
+{
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < i; k++)
+            x[i] -= l[i * n + k] * x[k];
+        x[i] /= l[i * n + i];
+    }
+    for (int i = n; i-- > 0;) {
+        for (int k = i + 1; k < n; k++)
+            x[i] -= l[k * n + i] * x[k];
+        x[i] /= l[i * n + i];
+    }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/symmetric.h -- eigenvectors and Cholesky factor of small symmetric matrices, n x n, row-major, in
-   double. */
+/* base/symmetric.h -- eigenvectors, Cholesky factor and linear equations of small symmetric matrices, n x n,
+   row-major, in double. */
 #ifndef GBT_BASE_SYMMETRIC_H
 #define GBT_BASE_SYMMETRIC_H
 
@@ -19,9 +19,12 @@ void symmetric_eigen(double *a, double *v, int n, double small);
 /**
  * m = l l^T, l lower triangular with zeros above; what a pivot is less than `least` (> 0) it is raised to.
  *
- * @param m [in] [n][n]
- * @param l [out] [n][n], not m
+ * @param m [in] [n][n], of which the lower half and the diagonal are read
+ * @param l [out] [n][n]; may be m
  */
 void symmetric_cholesky(const double *m, double *l, int n, double least);
+
+/** Solves l l^T x = b by symmetric_cholesky()'s factor; `x` [n] holds b before. */
+void symmetric_solve(const double *l, double *x, int n);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "base/morton.h"
 #include "base/paged.h"
 #include "base/parallel.h"
 #include "bvh/point_tree.h"
@@ -28,15 +29,6 @@ static size_t grain_of(size_t count)
 
 /* ---- the order in space ---- */
 
-/* Every third bit, from bit 0 on. */
-static uint32_t spread_bits(uint32_t x)
-{
-    x = (x | x << 16) & 0x030000FFu;
-    x = (x | x << 8) & 0x0300F00Fu;
-    x = (x | x << 4) & 0x030C30C3u;
-    return (x | x << 2) & 0x09249249u;
-}
-
 /* Morton code of a point among the cells of a grid over the centres; what is not a number is in cell 0. */
 static uint32_t code_of(const point_tree *tree, const double p[3])
 {
@@ -46,7 +38,7 @@ static uint32_t code_of(const point_tree *tree, const double p[3])
         const uint32_t cell = !(cells > 0)               ? 0
                               : cells < (1 << CODE_BITS) ? (uint32_t)cells
                                                          : (1 << CODE_BITS) - 1;
-        code |= spread_bits(cell) << j;
+        code |= (uint32_t)morton_spread(cell) << j;
     }
     return code;
 }

@@ -30,10 +30,7 @@ static int run(const operands *given)
 {
     gbt_error err = {0};
     gbt_comparison c;
-    double lpips[2];
-    gbt_status status = gbt_compare_images(given->value[0], given->value[1], &c, &err);
-    if (status == GBT_OK && network != NULL)
-        status = gbt_compare_lpips(given->value[0], given->value[1], network, lpips, &err);
+    const gbt_status status = gbt_compare_images(given->value[0], given->value[1], network, &c, &err);
     if (status != GBT_OK)
         return command_failed(status, &err);
     if (json) {
@@ -42,15 +39,15 @@ static int run(const operands *given)
         print_number("ssim", c.ssim, ", ");
         print_number("ssim_interior", c.ssim_interior, ", ");
         if (network != NULL) {
-            print_number("lpips", lpips[0], ", ");
-            print_number("lpips_01", lpips[1], ", ");
+            print_number("lpips", c.lpips, ", ");
+            print_number("lpips_01", c.lpips_01, ", ");
         }
         print_number("flip", c.flip, "}\n");
     } else {
         printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f", c.width, c.height,
                c.psnr, c.ssim, c.ssim_interior, c.flip);
         if (network != NULL)
-            printf(", LPIPS %.6f (colours in [0, 1]: %.6f)", lpips[0], lpips[1]);
+            printf(", LPIPS %.6f (colours in [0, 1]: %.6f)", c.lpips, c.lpips_01);
         putchar('\n');
     }
     return 0;

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_init.c -- gbtrace init. */
+#include <string.h>
+
 #include "cli/options.h"
+#include "cli/train_options.h"
 #include "gbtrace/init.h"
 
 static gbt_init_def def;
@@ -9,7 +12,7 @@ static const char *out, *json;
 static const option *options(int *count)
 {
     def = gbt_init_def_default();
-    static const option rows[] = {
+    const option all[] = {
         {.name = "output",
          .short_name = 'o',
          .kind = OPTION_STRING,
@@ -17,42 +20,11 @@ static const option *options(int *count)
          .value_name = "FILE.ply",
          .help = "where to write balls and anchors",
          .required = true},
-        {.name = "init",
-         .kind = OPTION_CHOICE,
-         .value = &def.init,
-         .choices = GBT_INIT_NAMES,
-         .help = "initial anchors: the paper's granular balls, adaptive granular balls, the voxel baseline, "
-                 "or random points"},
-        {.name = "init-count",
-         .kind = OPTION_DOUBLE,
-         .value = &def.init_count,
-         .min = 0,
-         .max = 1,
-         .value_name = "F",
-         .help = "adaptive and random: anchors per sparse point; 0: half as many anchors as gb gives",
-         .rare = true},
-        {.name = "scale-prior",
-         .kind = OPTION_CHOICE,
-         .value = &def.scale_prior,
-         .choices = GBT_SCALE_PRIOR_NAMES,
-         .help = "initial scale with --init gb: from ball radius and point spacing, or from spacing alone, "
-                 "as with the other --init"},
-        {.name = "max-depth",
-         .kind = OPTION_INT,
-         .value = &def.max_depth,
-         .min = 0,
-         .max = 64,
-         .value_name = "D",
-         .help = "maximum depth of the ball tree",
-         .rare = true},
-        {.name = "voxel-size",
-         .kind = OPTION_FLOAT,
-         .value = &def.voxel_size,
-         .min = 0,
-         .max = 1e30,
-         .value_name = "V",
-         .help = "voxel size, scene units; 0: estimated from the points",
-         .rare = true},
+        train_option("init", &def.init),
+        train_option("init-count", &def.init_count),
+        train_option("scale-prior", &def.scale_prior),
+        train_option("max-depth", &def.max_depth),
+        train_option("voxel-size", &def.voxel_size),
         {.name = "voxel-rule",
          .kind = OPTION_CHOICE,
          .value = &def.voxel_rule,
@@ -67,7 +39,9 @@ static const option *options(int *count)
         JSON_OPTION(&json, "write the counts to this file"),
         MEMORY_OPTION,
     };
-    *count = sizeof rows / sizeof *rows;
+    static option rows[sizeof all / sizeof *all];
+    memcpy(rows, all, sizeof all);
+    *count = sizeof all / sizeof *all;
     return rows;
 }
 

@@ -108,22 +108,11 @@ static option_kind kind_of(const gbt_train_setting *s)
     return OPTION_STRING;
 }
 
-/* A setting that is on is turned off: --no-NAME. */
-static const char *name_of(const gbt_train_setting *s, char room[NAME_SIZE])
+static option row_of(const gbt_train_setting *s, void *value)
 {
-    const char *name = s->option != NULL ? s->option : s->name;
-    if (kind_of(s) != OPTION_FLAG_OFF)
-        return name;
-    snprintf(room, NAME_SIZE, "no-%s", name);
-    return room;
-}
-
-/* `room` keeps the name, where it is another one than the setting's. */
-static option row_of(const gbt_train_setting *s, gbt_train_def *def, char room[NAME_SIZE])
-{
-    option row = {.name = name_of(s, room),
+    option row = {.name = s->option != NULL ? s->option : s->name,
                   .kind = kind_of(s),
-                  .value = (char *)def + s->offset,
+                  .value = value,
                   .min = s->or_zero ? 0 : s->min,
                   .max = s->max,
                   .choices = s->choices,
@@ -143,10 +132,24 @@ int train_options(gbt_train_def *def, option *out)
 {
     static char names[OPTIONS_MAX][NAME_SIZE];
     int count = 0;
-    for (size_t i = 0; i < gbt_train_setting_count(); i++, count++)
-        out[count] = row_of(gbt_train_setting_at(i), def, names[count]);
+    for (size_t i = 0; i < gbt_train_setting_count(); i++, count++) {
+        const gbt_train_setting *s = gbt_train_setting_at(i);
+        out[count] = row_of(s, (char *)def + s->offset);
+        if (out[count].kind == OPTION_FLAG_OFF) { /* a setting that is on is turned off: --no-NAME */
+            snprintf(names[count], NAME_SIZE, "no-%s", out[count].name);
+            out[count].name = names[count];
+        }
+    }
     memcpy(out + count, elsewhere, sizeof elsewhere);
     return count + ELSEWHERE_COUNT;
+}
+
+option train_option(const char *name, void *value)
+{
+    size_t i = 0;
+    while (strcmp(gbt_train_setting_at(i)->name, name) != 0)
+        i++;
+    return row_of(gbt_train_setting_at(i), value);
 }
 
 static gbt_status read_times(const char *eval_at, gbt_train_def *def, gbt_error *err)

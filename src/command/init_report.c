@@ -24,15 +24,18 @@
 #include "data/scene.h"
 #include "command/ball_mesh.h"
 #include "command/init_quality.h"
+#include "train/def.h"
 
 enum { ANCHOR_SCALES = 6 };
 
 gbt_init_def gbt_init_def_default(void)
 {
-    return (gbt_init_def){.init = GBT_INIT_GB,
-                          .init_count = anchor_init_def_default().fraction,
-                          .scale_prior = GBT_SCALE_PRIOR_GB,
-                          .max_depth = balls_def_default().max_depth,
+    const gbt_train_def train = gbt_train_def_default();
+    return (gbt_init_def){.init = train.init,
+                          .init_count = train.init_count,
+                          .scale_prior = train.scale_prior,
+                          .max_depth = train.max_depth,
+                          .voxel_size = train.voxel_size,
                           .voxel_rule = GBT_VOXEL_RULE_MEDIAN,
                           .cookie_ = DEF_COOKIE};
 }
@@ -303,13 +306,14 @@ done:
 static gbt_status check_def(const gbt_init_def *def, gbt_error *err)
 {
     GBT_TRY(def_check(def->cookie_, "gbt_init_def_default", err));
-    GBT_TRY(choice_check("init", GBT_INIT_NAMES, (int)def->init, err));
-    GBT_TRY(choice_check("scale_prior", GBT_SCALE_PRIOR_NAMES, (int)def->scale_prior, err));
     GBT_TRY(choice_check("voxel_rule", GBT_VOXEL_RULE_NAMES, (int)def->voxel_rule, err));
-    if (!(def->voxel_size >= 0.0f && isfinite(def->voxel_size)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "voxel_size: %g (wanted a finite number >= 0)",
-                         (double)def->voxel_size);
-    return GBT_OK;
+    gbt_train_def train = gbt_train_def_default(); /* which has the same ranges */
+    train.init = def->init;
+    train.init_count = def->init_count;
+    train.scale_prior = def->scale_prior;
+    train.max_depth = def->max_depth;
+    train.voxel_size = def->voxel_size;
+    return train_def_check(&train, err);
 }
 
 gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_ply, const char *json_path,

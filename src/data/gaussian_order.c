@@ -7,6 +7,7 @@
 
 #include "base/compare.h"
 #include "base/memory.h"
+#include "base/morton.h"
 
 enum { AXIS_BITS = 21, SHELLS = 64 };
 
@@ -30,15 +31,6 @@ float gaussian_median(float *values, size_t count)
 {
     qsort(values, count, sizeof *values, compare_floats);
     return values[count / 2];
-}
-
-/* Bit k of `value` to bit 3 k. */
-static uint64_t spread(uint64_t value)
-{
-    uint64_t out = 0;
-    for (int k = 0; k < AXIS_BITS; k++)
-        out |= (value >> k & 1) << (3 * k);
-    return out;
 }
 
 static double distance(const float *mean, const double middle[3])
@@ -69,7 +61,7 @@ static void find_codes(const gaussian_cloud *cloud, float *values, coded *list)
             half *= 2;
         for (size_t k = 0; k < 3; k++) {
             const double place = ((double)mean[k] - middle[k]) / (2 * half) + 0.5;
-            list[i].code |= spread((uint64_t)(fmin(fmax(place, 0), 1) * ((1 << AXIS_BITS) - 1))) << k;
+            list[i].code |= morton_spread((uint64_t)(fmin(fmax(place, 0), 1) * ((1 << AXIS_BITS) - 1))) << k;
         }
     }
 }

@@ -80,7 +80,7 @@ const gaussian_format gaussian_format_ply = {
 
 const gaussian_format gaussian_format_compressed_ply = {
     .ending = ".compressed.ply",
-    .what = "a quarter of a .ply: positions to 1/1000 or better of a chunk of 256, colours in 8 bits",
+    .what = "a quarter of a .ply: positions to 1/1000 of a chunk of 256, colours in 8 bits",
     .degree = 3,
     .read = gaussian_ply_read,
     .holds = gaussian_ply_has_gaussians,

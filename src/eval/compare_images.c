@@ -26,7 +26,8 @@ static gbt_status read_colors(const char *path, image *out, gbt_error *err)
 /* Of two quantized images. */
 static gbt_status compare(const image *a, const image *b, gbt_comparison *out, gbt_error *err)
 {
-    *out = (gbt_comparison){.width = a->width, .height = a->height, .psnr = metric_psnr(a, b)};
+    *out = (gbt_comparison){
+        .width = a->width, .height = a->height, .psnr = metric_psnr(a, b), .lpips = NAN, .lpips_01 = NAN};
     GBT_TRY(metric_ssim(a, b, &out->ssim, err));
     GBT_TRY(metric_ssim_interior(a, b, &out->ssim_interior, err));
     return metric_flip(a, b, &out->flip, NULL, err);
@@ -43,32 +44,29 @@ static gbt_status read_pair(const char *path, const char *reference, image *a, i
     return GBT_OK;
 }
 
-gbt_status gbt_compare_images(const char *path, const char *reference, gbt_comparison *out, gbt_error *err)
+static gbt_status compare_lpips(const image *a, const image *b, const char *network, gbt_comparison *out,
+                                gbt_error *err)
+{
+    lpips *net;
+    lpips_scores scores = {0};
+    GBT_TRY(lpips_open(network, &net, err));
+    const gbt_status status = lpips_compare(net, a, b, NULL, 0, &scores, err);
+    out->lpips = scores.lpips;
+    out->lpips_01 = scores.lpips_01;
+    lpips_close(net);
+    return status;
+}
+
+gbt_status gbt_compare_images(const char *path, const char *reference, const char *network,
+                              gbt_comparison *out, gbt_error *err)
 {
     image a = {0}, b = {0};
     *out = (gbt_comparison){0};
     gbt_status status = read_pair(path, reference, &a, &b, err);
     if (status == GBT_OK)
         status = compare(&a, &b, out, err);
-    image_free(&a);
-    image_free(&b);
-    return status;
-}
-
-gbt_status gbt_compare_lpips(const char *path, const char *reference, const char *network, double out[2],
-                             gbt_error *err)
-{
-    image a = {0}, b = {0};
-    lpips *net = NULL;
-    lpips_scores scores = {0};
-    gbt_status status = read_pair(path, reference, &a, &b, err);
-    if (status == GBT_OK)
-        status = lpips_open(network, &net, err);
-    if (status == GBT_OK)
-        status = lpips_compare(net, &a, &b, NULL, 0, &scores, err);
-    out[0] = scores.lpips;
-    out[1] = scores.lpips_01;
-    lpips_close(net);
+    if (status == GBT_OK && network != NULL)
+        status = compare_lpips(&a, &b, network, out, err);
     image_free(&a);
     image_free(&b);
     return status;

@@ -9,6 +9,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/symmetric.h"
 
 enum { INPUTS = 4, OUTPUTS = 3, BLOCKS_MAX = 64 };
 
@@ -128,37 +129,13 @@ void affine_cut_backward(const image *photo, const image *shown, image *d)
 
 /* ---- least squares ---- */
 
-/* a x = b for a symmetric positive definite 4 x 4 and three right sides, by a = l l^T in place. */
-static void solve(double a[INPUTS][INPUTS], double b[OUTPUTS][INPUTS])
-{
-    for (int i = 0; i < INPUTS; i++)
-        for (int j = 0; j <= i; j++) {
-            double sum = a[i][j];
-            for (int k = 0; k < j; k++)
-                sum -= a[i][k] * a[j][k];
-            a[i][j] = i == j ? sqrt(sum) : sum / a[j][j];
-        }
-    for (int r = 0; r < OUTPUTS; r++) {
-        for (int i = 0; i < INPUTS; i++) {
-            for (int k = 0; k < i; k++)
-                b[r][i] -= a[i][k] * b[r][k];
-            b[r][i] /= a[i][i];
-        }
-        for (int i = INPUTS - 1; i >= 0; i--) {
-            for (int k = i + 1; k < INPUTS; k++)
-                b[r][i] -= a[k][i] * b[r][k];
-            b[r][i] /= a[i][i];
-        }
-    }
-}
-
 static double finite_or_0(float value) { return isfinite(value) ? (double)value : 0; }
 
 void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end,
                 float m[AFFINE_NUMBERS])
 {
     const double ridge = 1e-6;
-    double a[INPUTS][INPUTS] = {{0}}, b[OUTPUTS][INPUTS] = {{0}}, used = 0;
+    double a[INPUTS * INPUTS] = {0}, b[OUTPUTS][INPUTS] = {{0}}, used = 0;
     for (int y = 0; y < from->height; y++)
         for (int x = begin; x < end; x++) {
             const size_t pixel = (size_t)y * (size_t)from->width + (size_t)x, at = 3 * pixel;
@@ -169,21 +146,23 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
             const double in[INPUTS] = {finite_or_0(p[0]), finite_or_0(p[1]), finite_or_0(p[2]), 1};
             for (int i = 0; i < INPUTS; i++) {
                 for (int j = 0; j <= i; j++)
-                    a[i][j] += in[i] * in[j];
+                    a[i * INPUTS + j] += in[i] * in[j];
                 for (int r = 0; r < OUTPUTS; r++)
                     b[r][i] += in[i] * finite_or_0(q[r]);
             }
         }
     const double weight = ridge * fmax(1, used);
     for (int i = 0; i < INPUTS; i++) {
-        a[i][i] += weight;
+        a[i * (INPUTS + 1)] += weight;
         if (i < OUTPUTS)
             b[i][i] += weight;
     }
-    solve(a, b);
-    for (int r = 0; r < OUTPUTS; r++)
+    symmetric_cholesky(a, a, INPUTS, 1e-300); /* positive definite */
+    for (int r = 0; r < OUTPUTS; r++) {
+        symmetric_solve(a, b[r], INPUTS);
         for (int i = 0; i < INPUTS; i++)
             m[4 * r + i] = (float)b[r][i];
+    }
 }
 
 /* ---- left and right ---- */

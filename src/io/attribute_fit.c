@@ -4,34 +4,14 @@
 #include <math.h>
 
 #include "base/memory.h"
+#include "base/symmetric.h"
 #include "io/attribute_code.h"
 
 enum { UNKNOWNS_MAX = ATTRIBUTE_INPUTS_MAX + 1, ROWS_MAX = 20000 /* as many say enough */ };
 
 typedef struct fit {
-    double normal[UNKNOWNS_MAX][UNKNOWNS_MAX], right[UNKNOWNS_MAX], input[UNKNOWNS_MAX];
+    double normal[UNKNOWNS_MAX * UNKNOWNS_MAX], right[UNKNOWNS_MAX], input[UNKNOWNS_MAX];
 } fit;
-
-/* Solve the symmetric system by Cholesky's way; normal is destroyed, the solution is in right. */
-static void solve(fit *f, size_t n)
-{
-    for (size_t i = 0; i < n; i++) {
-        for (size_t j = 0; j <= i; j++) {
-            double sum = f->normal[i][j];
-            for (size_t k = 0; k < j; k++)
-                sum -= f->normal[i][k] * f->normal[j][k];
-            f->normal[i][j] = i == j ? sqrt(fmax(sum, 1e-9)) : sum / f->normal[j][j];
-        }
-        for (size_t k = 0; k < i; k++)
-            f->right[i] -= f->normal[i][k] * f->right[k];
-        f->right[i] /= f->normal[i][i];
-    }
-    for (size_t i = n; i-- > 0;) {
-        for (size_t k = i + 1; k < n; k++)
-            f->right[i] -= f->normal[k][i] * f->right[k];
-        f->right[i] /= f->normal[i][i];
-    }
-}
 
 static int32_t rounded(double x)
 {
@@ -47,7 +27,7 @@ static void fit_column(attribute_table *t, size_t column, fit *f)
     for (size_t i = 0; i < n; i++) {
         f->right[i] = 0;
         for (size_t j = 0; j <= i; j++)
-            f->normal[i][j] = i != j ? 0 : i == 0 ? 1e-6 : 1 + 1e-3 * (double)(t->rows / stride);
+            f->normal[i * n + j] = i != j ? 0 : i == 0 ? 1e-6 : 1 + 1e-3 * (double)(t->rows / stride);
     }
     for (size_t row = 1; row < t->rows; row += stride) {
         const int32_t *own = t->value + row * columns;
@@ -59,10 +39,11 @@ static void fit_column(attribute_table *t, size_t column, fit *f)
         for (size_t i = 0; i < n; i++) {
             f->right[i] += f->input[i] * own[column];
             for (size_t j = 0; j <= i; j++)
-                f->normal[i][j] += f->input[i] * f->input[j];
+                f->normal[i * n + j] += f->input[i] * f->input[j];
         }
     }
-    solve(f, n);
+    symmetric_cholesky(f->normal, f->normal, (int)n, 1e-9);
+    symmetric_solve(f->normal, f->right, (int)n);
     attribute_rule *rule = &t->rule[column];
     rule->bias = rounded(f->right[0] * ATTRIBUTE_ONE);
     for (size_t i = 1; i < n; i++)

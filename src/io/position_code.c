@@ -6,19 +6,11 @@
 #include <string.h>
 
 #include "base/memory.h"
+#include "base/morton.h"
 
 /* ---- cells ---- */
 
-/* Two zeros between any two of 21 bits, and back. */
-static uint64_t spread_bits(uint64_t x)
-{
-    x = (x | x << 32) & UINT64_C(0x1F00000000FFFF);
-    x = (x | x << 16) & UINT64_C(0x1F0000FF0000FF);
-    x = (x | x << 8) & UINT64_C(0x100F00F00F00F00F);
-    x = (x | x << 4) & UINT64_C(0x10C30C30C30C30C3);
-    return (x | x << 2) & UINT64_C(0x1249249249249249);
-}
-
+/* morton_spread() back. */
 static uint32_t gather(uint64_t x)
 {
     x &= UINT64_C(0x1249249249249249);
@@ -31,7 +23,7 @@ static uint32_t gather(uint64_t x)
 
 static uint64_t code_of(const uint32_t cell[3])
 {
-    return spread_bits(cell[0]) | spread_bits(cell[1]) << 1 | spread_bits(cell[2]) << 2;
+    return morton_spread(cell[0]) | morton_spread(cell[1]) << 1 | morton_spread(cell[2]) << 2;
 }
 
 void position_split(uint64_t code, uint32_t cell[3])

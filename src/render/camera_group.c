@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/camera_axes.h"
 #include "base/compare.h"
 #include "base/memory.h"
 #include "base/symmetric.h"
@@ -73,38 +74,6 @@ static void find_up(const gbt_camera *cameras, size_t count, const double middle
         spread[4 * low] < flat_share * flat_share * next && fabs(cosine) > flat_cosine)
         for (int k = 0; k < 3; k++)
             up[k] = cosine < 0 ? -normal[k] : normal[k];
-}
-
-/** Least squares: sum (I - d d^T) (x - c) = 0 over the axes of view. False where it does not say enough. */
-static bool nearest_to_axes(const gbt_camera *cameras, size_t count, const double middle[3], double out[3])
-{
-    double a[9] = {0}, b[3] = {0}, v[9];
-    for (size_t i = 0; i < count; i++) {
-        const double *d = cameras[i].rotation + 6;
-        for (int row = 0; row < 3; row++)
-            for (int k = 0; k < 3; k++) {
-                const double m = ((row == k) - d[row] * d[k]) / (double)count;
-                a[3 * row + k] += m;
-                b[row] += m * (cameras[i].center[k] - middle[k]);
-            }
-    }
-    symmetric_eigen(a, v, 3, 1e-15);
-    memcpy(out, middle, 3 * sizeof *out);
-    for (int k = 0; k < 3; k++) {
-        const double column[3] = {v[k], v[3 + k], v[6 + k]};
-        if (!(a[4 * k] > 0.01))
-            return false;
-        for (int row = 0; row < 3; row++)
-            out[row] += column[row] * dvec_dot(column, b) / a[4 * k];
-    }
-    size_t in_front = 0;
-    for (size_t i = 0; i < count; i++) {
-        double way[3];
-        for (int k = 0; k < 3; k++)
-            way[k] = out[k] - cameras[i].center[k];
-        in_front += dvec_dot(way, cameras[i].rotation + 6) > 0;
-    }
-    return 2 * in_front > count;
 }
 
 /** Along the mean direction of view, as deep as the points in front; false without such. */
@@ -186,7 +155,7 @@ gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const floa
     find_up(cameras, count, middle, out->up);
     const double far = near_point_distance(points, point_count, middle, scratch),
                  least = fmax(on_the_spot_share * far, 1e-12);
-    if (!(nearest_to_axes(cameras, count, middle, out->focus) &&
+    if (!(camera_axes_meet(cameras, count, middle, out->focus) &&
           median_distance(cameras, count, out->focus, scratch) > least) &&
         !amid_points(cameras, count, middle, points, point_count, scratch, out->focus))
         memset(out->focus, 0, sizeof out->focus);

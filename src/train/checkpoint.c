@@ -16,26 +16,38 @@
 #include "train/config.h"
 #include "train/widest.h"
 
-enum { NAME_SIZE = 64, PHOTO_END_BYTES = 2048 };
+enum { PHOTO_END_BYTES = 2048 };
 
-static void add_field(container_writer *w, const char *prefix, const char *field, int dim_count,
-                      const size_t *dims, const float *data)
+int checkpoint_arrays(trainer *t, checkpoint_array out[CHECKPOINT_ARRAYS])
 {
-    char name[NAME_SIZE];
-    snprintf(name, sizeof name, "%s.%s", prefix, field);
-    container_add(w, name, CONTAINER_F32, dim_count, dims, data);
+    exposures *e = &t->exposures;
+    poses *p = &t->poses;
+    sky_moments *s = &t->sky;
+    const size_t views = p->count > 0 ? t->scene.view_count : 0,
+                 sky_rows = t->settings.sky.varies ? SH_COUNT : 0;
+    const checkpoint_array all[CHECKPOINT_ARRAYS] = {
+        {"exposure.matrix", CONTAINER_F32, 2, {e->count, AFFINE_NUMBERS}, e->matrix, &e->matrix},
+        {"exposure.moment1", CONTAINER_F32, 2, {e->count, AFFINE_NUMBERS}, e->moment1, &e->moment1},
+        {"exposure.moment2", CONTAINER_F32, 2, {e->count, AFFINE_NUMBERS}, e->moment2, &e->moment2},
+        {"exposure.visits", CONTAINER_U64, 1, {e->count, 1}, e->visits, &e->visits},
+        {"pose.views", CONTAINER_F64, 2, {views, POSE_PACKED}, p->packed, &p->packed},
+        {"pose.moment1", CONTAINER_F32, 2, {p->count, POSE_NUMBERS}, p->moment1, &p->moment1},
+        {"pose.moment2", CONTAINER_F32, 2, {p->count, POSE_NUMBERS}, p->moment2, &p->moment2},
+        {"pose.visits", CONTAINER_U64, 1, {p->count, 1}, p->visits, &p->visits},
+        {"sky.values", CONTAINER_F32, 2, {sky_rows, 3}, s->packed, NULL},
+        {"sky.moment1", CONTAINER_F32, 2, {sky_rows, 3}, s->first, NULL},
+        {"sky.moment2", CONTAINER_F32, 2, {sky_rows, 3}, s->second, NULL},
+    };
+    int count = 0;
+    for (int i = 0; i < CHECKPOINT_ARRAYS; i++)
+        if (all[i].dims[0] > 0)
+            out[count++] = all[i];
+    return count;
 }
 
-/* One field of the exposures, which have a row of AFFINE_NUMBERS per photo. */
-static gbt_status copy_exposures(const container *c, const char *field, size_t rows, float *out,
-                                 gbt_error *err)
+size_t checkpoint_array_bytes(const checkpoint_array *a)
 {
-    char name[NAME_SIZE];
-    snprintf(name, sizeof name, "exposure.%s", field);
-    const void *data;
-    GBT_TRY(container_find(c, name, CONTAINER_F32, 2, (size_t[]){rows, AFFINE_NUMBERS}, &data, err));
-    memcpy(out, data, rows * AFFINE_NUMBERS * sizeof *out);
-    return GBT_OK;
+    return a->dims[0] * a->dims[1] * (a->dtype == CONTAINER_F32 ? sizeof(float) : sizeof(double));
 }
 
 /* Anchors in the file, in the order of their sections. */
@@ -161,17 +173,6 @@ gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t 
     return GBT_OK;
 }
 
-static void add_poses(container_writer *w, const trainer *t)
-{
-    const poses *p = &t->poses;
-    const size_t dims[2] = {p->count, POSE_NUMBERS}, pose_dims[2] = {t->scene.view_count, POSE_PACKED};
-    poses_pack(p, &t->scene);
-    container_add(w, "pose.views", CONTAINER_F64, 2, pose_dims, p->packed);
-    add_field(w, "pose", "moment1", 2, dims, p->moment1);
-    add_field(w, "pose", "moment2", 2, dims, p->moment2);
-    container_add(w, "pose.visits", CONTAINER_U64, 1, &p->count, p->visits);
-}
-
 /* The old file under both names, so that one of the usual name is there whatever happens while the new one is
    written. Where files cannot have two names it is moved: whoever resumes looks at PATH.prev next. */
 static gbt_status keep_previous(const char *path, gbt_error *err)
@@ -185,7 +186,7 @@ static gbt_status keep_previous(const char *path, gbt_error *err)
     return base_fail(err, GBT_ERR_IO, "%s: cannot keep the previous checkpoint: %s", path, strerror(errno));
 }
 
-gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
+gbt_status checkpoint_save(trainer *t, const char *path, gbt_error *err)
 {
     char config[CONFIG_TEXT_SIZE];
     config_text(&t->def, t->scene.folder, config, sizeof config);
@@ -211,24 +212,13 @@ gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err)
     checkpoint_hash_data(t, of_data);
     for (int i = 0; i < CHECKPOINT_DATA_HASHES; i++)
         container_add_small(&w, data_hashes[i].section, CONTAINER_U64, 1, &of_data[i]);
-    const exposures *e = &t->exposures;
-    const size_t exposure_dims[2] = {e->count, AFFINE_NUMBERS};
-    if (e->count > 0) {
-        add_field(&w, "exposure", "matrix", 2, exposure_dims, e->matrix);
-        add_field(&w, "exposure", "moment1", 2, exposure_dims, e->moment1);
-        add_field(&w, "exposure", "moment2", 2, exposure_dims, e->moment2);
-        container_add(&w, "exposure.visits", CONTAINER_U64, 1, &e->count, e->visits);
-    }
+    checkpoint_array arrays[CHECKPOINT_ARRAYS];
+    const int array_count = checkpoint_arrays(t, arrays);
     if (t->poses.count > 0)
-        add_poses(&w, t);
-    const size_t sky_dims[2] = {SH_COUNT, 3};
-    float sky_values[SKY_NUMBERS];
-    if (t->settings.sky.varies) {
-        sky_pack(&t->settings, sky_values);
-        add_field(&w, "sky", "values", 2, sky_dims, sky_values);
-        add_field(&w, "sky", "moment1", 2, sky_dims, t->sky.first);
-        add_field(&w, "sky", "moment2", 2, sky_dims, t->sky.second);
-    }
+        poses_pack(&t->poses, &t->scene);
+    sky_pack(&t->settings, t->sky.packed);
+    for (const checkpoint_array *a = arrays; a < arrays + array_count; a++)
+        container_add(&w, a->section, a->dtype, a->dim_count, a->dims, a->data);
     for (int i = 0; i < ANCHOR_SETS; i++)
         add_anchors(&w, anchor_set_names[i], sets[i]);
     container_add(&w, "anchors.born", CONTAINER_U64, 1, &rows, t->created);
@@ -252,49 +242,19 @@ gbt_status checkpoint_config(const char *path, char *out, size_t size, gbt_error
     return status;
 }
 
-static gbt_status read_exposures(const container *c, exposures *e, gbt_error *err)
+static gbt_status read_arrays(trainer *t, const container *c, gbt_error *err)
 {
-    const struct {
-        const char *field;
-        float *out;
-    } fields[] = {{"matrix", e->matrix}, {"moment1", e->moment1}, {"moment2", e->moment2}};
-    for (int i = 0; i < 3; i++)
-        GBT_TRY(copy_exposures(c, fields[i].field, e->count, fields[i].out, err));
-    return container_get(c, "exposure.visits", CONTAINER_U64, e->count, e->visits, err);
-}
-
-static gbt_status read_poses(trainer *t, const container *c, gbt_error *err)
-{
-    const poses *p = &t->poses;
-    const struct {
-        const char *name;
-        container_dtype dtype;
-        size_t dims[2], bytes;
-        void *out;
-    } parts[] = {{"pose.views", CONTAINER_F64, {t->scene.view_count, POSE_PACKED}, sizeof(double), p->packed},
-                 {"pose.moment1", CONTAINER_F32, {p->count, POSE_NUMBERS}, sizeof(float), p->moment1},
-                 {"pose.moment2", CONTAINER_F32, {p->count, POSE_NUMBERS}, sizeof(float), p->moment2}};
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
-        size_t dims[2] = {parts[i].dims[0], parts[i].dims[1]};
+    checkpoint_array arrays[CHECKPOINT_ARRAYS];
+    const int count = checkpoint_arrays(t, arrays);
+    for (checkpoint_array *a = arrays; a < arrays + count; a++) {
         const void *data;
-        GBT_TRY(container_find(c, parts[i].name, parts[i].dtype, 2, dims, &data, err));
-        memcpy(parts[i].out, data, dims[0] * dims[1] * parts[i].bytes);
+        GBT_TRY(container_find(c, a->section, a->dtype, a->dim_count, a->dims, &data, err));
+        memcpy(a->data, data, checkpoint_array_bytes(a));
     }
-    GBT_TRY(container_get(c, "pose.visits", CONTAINER_U64, p->count, p->visits, err));
-    poses_unpack(p, &t->scene);
-    return GBT_OK;
-}
-
-static gbt_status read_sky(trainer *t, const container *c, gbt_error *err)
-{
-    static const char *const names[] = {"sky.values", "sky.moment1", "sky.moment2"};
-    float values[SKY_NUMBERS], *const out[] = {values, t->sky.first, t->sky.second};
-    for (int i = 0; i < 3; i++) {
-        const void *data;
-        GBT_TRY(container_find(c, names[i], CONTAINER_F32, 2, (size_t[]){SH_COUNT, 3}, &data, err));
-        memcpy(out[i], data, SKY_NUMBERS * sizeof *out[i]);
-    }
-    sky_unpack(values, &t->settings);
+    if (t->poses.count > 0)
+        poses_unpack(&t->poses, &t->scene);
+    if (t->settings.sky.varies)
+        sky_unpack(t->sky.packed, &t->settings);
     return GBT_OK;
 }
 
@@ -361,12 +321,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     GBT_TRY(growth_stats_resize(&t->stats, rows, t->def.offsets, err));
     GBT_TRY(row_sections_get(c, "stats", growth_stat_fields, GROWTH_STATS, rows, (size_t)t->def.offsets,
                              t->stats.field, err));
-    if (t->exposures.count > 0)
-        GBT_TRY(read_exposures(c, &t->exposures, err));
-    if (t->poses.count > 0)
-        GBT_TRY(read_poses(t, c, err));
-    if (t->settings.sky.varies)
-        GBT_TRY(read_sky(t, c, err));
+    GBT_TRY(read_arrays(t, c, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
     GBT_TRY(container_get(c, "seconds", CONTAINER_F64, 1, &t->seconds, err));
     uint64_t in_row[3] = {0, 0, 0};

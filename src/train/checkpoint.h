@@ -3,7 +3,24 @@
 #ifndef GBT_TRAIN_CHECKPOINT_H
 #define GBT_TRAIN_CHECKPOINT_H
 
+#include "io/container.h"
 #include "train/trainer.h"
+
+/** An array of the exposures, poses or sky that a trainer learns, and its section. */
+typedef struct checkpoint_array {
+    const char *section;
+    container_dtype dtype; /* of 4 or 8 bytes */
+    int dim_count;
+    size_t dims[2]; /* [1] is 1 with dim_count 1 */
+    void *data;
+    void *pointer; /* the trainer's, to `data`; NULL: that is in the trainer itself */
+} checkpoint_array;
+
+enum { CHECKPOINT_ARRAYS = 11 };
+
+/** Those of what this trainer learns; returns how many. Poses and sky are as poses_pack(), sky_pack(). */
+int checkpoint_arrays(trainer *t, checkpoint_array out[CHECKPOINT_ARRAYS]);
+size_t checkpoint_array_bytes(const checkpoint_array *a);
 
 /** FNV-1a of the sizes of all photos, and of the bytes at both ends of each: another photo under the same
    name has another one. Likewise of all masks. GBT_ERR_IO: one cannot be read. */
@@ -19,7 +36,7 @@ const char *checkpoint_data_difference(const uint64_t a[CHECKPOINT_DATA_HASHES],
 
 /** Write the trainer's state atomically; the checkpoint before it is kept as PATH.prev, and at PATH until the
     new one is whole. */
-gbt_status checkpoint_save(const trainer *t, const char *path, gbt_error *err);
+gbt_status checkpoint_save(trainer *t, const char *path, gbt_error *err);
 
 /**
  * Put a saved state into a trainer that trainer_open() has made for the same data and the same settings.

@@ -133,7 +133,7 @@ static run_clock clock_start(const trainer *t, save_beside *saving)
 }
 
 /* A run that took more than it may ends, saved: with more memory it goes on. */
-static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_error *err)
+static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *err)
 {
     const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
     if (peak <= t->def.memory)
@@ -150,7 +150,7 @@ static gbt_status check_memory(const trainer *t, const run_paths *paths, gbt_err
 static bool is_of_data(gbt_status status) { return status == GBT_ERR_FORMAT || status == GBT_ERR_IO; }
 
 /* A run that fails because of `why`: where that is of the data it ends saved. */
-static gbt_status end_failed(const trainer *t, const run_paths *paths, save_beside *saving, gbt_status status,
+static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *saving, gbt_status status,
                              const gbt_error *why, gbt_error *err)
 {
     if (is_of_data(status) && t->step > 0 && cluster_leads()) {

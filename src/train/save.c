@@ -75,7 +75,7 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
     return status;
 }
 
-gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err)
+gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err)
 {
     gbt_status status[4] = {checkpoint_save(t, paths->checkpoint, err)};
     if (t->exposures.count > 0)
@@ -133,19 +133,13 @@ static copy_list list_arrays(trainer *t)
     for (int f = 0; f < GROWTH_STATS; f++)
         list_array(&list, &t->stats.field[f],
                    rows * row_field_width(&growth_stat_fields[f], t->stats.offset_count) * sizeof(float));
-    const size_t matrices = t->exposures.count * AFFINE_NUMBERS * sizeof(float);
-    list_array(&list, &t->exposures.matrix, matrices);
-    list_array(&list, &t->exposures.moment1, matrices);
-    list_array(&list, &t->exposures.moment2, matrices);
-    list_array(&list, &t->exposures.visits, t->exposures.count * sizeof *t->exposures.visits);
-    if (t->poses.count > 0) {
-        const size_t moments = t->poses.count * POSE_NUMBERS * sizeof(float), views = t->scene.view_count;
-        list_array(&list, &t->poses.moment1, moments);
-        list_array(&list, &t->poses.moment2, moments);
-        list_array(&list, &t->poses.visits, t->poses.count * sizeof *t->poses.visits);
-        list_array(&list, &t->poses.packed, views * POSE_PACKED * sizeof *t->poses.packed);
-        list_array(&list, &t->scene.views, views * sizeof *t->scene.views);
-    }
+    checkpoint_array arrays[CHECKPOINT_ARRAYS];
+    const int count = checkpoint_arrays(t, arrays);
+    for (const checkpoint_array *a = arrays; a < arrays + count; a++)
+        if (a->pointer != NULL)
+            list_array(&list, a->pointer, checkpoint_array_bytes(a));
+    if (t->poses.count > 0)
+        list_array(&list, &t->scene.views, t->scene.view_count * sizeof *t->scene.views);
     return list;
 }
 
@@ -187,7 +181,7 @@ static void write_copy(void *context)
     s->status = save_all(&s->copy, s->paths, &s->error);
 }
 
-gbt_status save_begin(save_beside *s, const trainer *t, const run_paths *paths, gbt_error *err)
+gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err)
 {
     if (copy_trainer(t, &s->copy, &s->memory, NULL) != GBT_OK)
         return save_all(t, paths, err);

@@ -16,7 +16,7 @@ typedef struct run_paths {
 
 /** Write all of them, also those after one that cannot be written: the checkpoint is 20 times as large as the
     model. The first failure. */
-gbt_status save_all(const trainer *t, const run_paths *paths, gbt_error *err);
+gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A save that is written while steps go on: of a copy of all that changes. Start from {0}. */
 typedef struct save_beside {
@@ -32,7 +32,7 @@ typedef struct save_beside {
  * Begin one; `paths` are borrowed until save_finish(). Without memory for the copy it is done when this
  * returns. None may be under way: save_finish() first.
  */
-gbt_status save_begin(save_beside *s, const trainer *t, const run_paths *paths, gbt_error *err);
+gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err);
 
 /** Still being written? */
 bool save_is_under_way(save_beside *s);

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/camera_axes.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/log.h"
@@ -14,7 +15,6 @@
 #include "base/paged.h"
 #include "base/parallel.h"
 #include "base/rng.h"
-#include "base/symmetric.h"
 #include "base/vec.h"
 
 enum {
@@ -33,8 +33,6 @@ enum {
 /* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not
    next to it. */
 static const float agreement = 0.7f, lead = 0.05f;
-/* Mean squared sine of the angles between optical axes from which on they say where they meet (6 degrees). */
-static const double least_spread = 0.01;
 
 typedef struct candidate {
     float position[3], color[3];
@@ -59,51 +57,23 @@ typedef struct seeding {
     candidate *out;
 } seeding;
 
-/* Point nearest to all optical axes in the least-squares sense; the mean distance to it is the scene's
-   scale. False where the axes do not meet in front of the cameras: then the mean distance of the cameras to
-   their middle. */
+/* The scene's scale: the mean distance of the cameras to where their axes meet. False where these do not:
+   then to the middle of the cameras. */
 static bool find_scale(const seed_view *views, size_t count, double *distance)
 {
-    double a[3][4] = {{0}}, middle[3] = {0}, focus[3], spread[9], axes[9];
-    for (size_t i = 0; i < count; i++)
+    gbt_camera cameras[SEED_VIEWS_MOST] = {{0}};
+    double middle[3] = {0}, focus[3], sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        cameras[i] = views[i].camera;
         for (int k = 0; k < 3; k++)
-            middle[k] += views[i].camera.center[k] / (double)count;
-    for (size_t i = 0; i < count; i++) {
-        const double *d = views[i].camera.rotation + 6; /* third row: the optical axis in the world */
-        for (int r = 0; r < 3; r++)
-            for (int c = 0; c < 3; c++) {
-                const double p = (r == c ? 1 : 0) - d[r] * d[c];
-                a[r][c] += p;
-                a[r][3] += p * (views[i].camera.center[c] - middle[c]);
-            }
+            middle[k] += cameras[i].center[k] / (double)count;
     }
-    for (int k = 0; k < 9; k++)
-        spread[k] = a[k / 3][k % 3] / (double)count;
-    symmetric_eigen(spread, axes, 3, 1e-15);
-    for (int r = 0; r < 3; r++)
-        a[r][r] += 1e-6 * (double)count; /* parallel axes: the matrix can be inverted */
-    for (int k = 0; k < 3; k++)          /* the matrix is positive definite: no pivoting needed */
-        for (int r = 0; r < 3; r++) {
-            if (r == k)
-                continue;
-            const double f = a[r][k] / a[k][k];
-            for (int c = k; c < 4; c++)
-                a[r][c] -= f * a[k][c];
-        }
-    for (int k = 0; k < 3; k++)
-        focus[k] = middle[k] + a[k][3] / a[k][k];
-    double sum = 0, sum_middle = 0;
-    size_t in_front = 0;
+    const bool meet = camera_axes_meet(cameras, count, middle, focus);
+    const double *to = meet ? focus : middle;
     for (size_t i = 0; i < count; i++) {
-        const double *at = views[i].camera.center,
-                     d[3] = {focus[0] - at[0], focus[1] - at[1], focus[2] - at[2]},
-                     m[3] = {middle[0] - at[0], middle[1] - at[1], middle[2] - at[2]};
-        sum += dvec_length(d);
-        sum_middle += dvec_length(m);
-        in_front += dvec_dot(d, views[i].camera.rotation + 6) > 0;
+        const double *at = cameras[i].center;
+        sum += dvec_length((const double[3]){to[0] - at[0], to[1] - at[1], to[2] - at[2]});
     }
-    const bool meet = fmin(fmin(spread[0], spread[4]), spread[8]) > least_spread && 2 * in_front > count;
-    sum = meet ? sum : sum_middle;
     *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
     return meet;
 }

@@ -243,7 +243,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(setup_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));
-    t->renderer = t->def.renderer;
     GBT_TRY(make_views(t, err));
     GBT_TRY(make_state(t, err));
     choose_background(t);

@@ -14,6 +14,7 @@ enum { SKY_NUMBERS = SH_COUNT * 3 };
 /** Adam's, of one sky. Start from {0}. */
 typedef struct sky_moments {
     float first[SKY_NUMBERS], second[SKY_NUMBERS];
+    float packed[SKY_NUMBERS]; /* room for sky_pack() */
 } sky_moments;
 
 /** All coefficients as one array, and back. */

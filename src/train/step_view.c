@@ -164,8 +164,8 @@ void step_view_pick(trainer *t, step_view *v, size_t index)
 static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera, double progress)
 {
     const bool rays =
-        t->renderer != GBT_RENDERER_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
-    return rays ? t->renderer : GBT_RENDERER_RASTER;
+        t->def.renderer != GBT_RENDERER_TRACE || progress >= t->rules.splats_until || !raster_takes(camera);
+    return rays ? t->def.renderer : GBT_RENDERER_RASTER;
 }
 
 float step_view_near(const trainer *t, const step_view *v)
@@ -179,7 +179,7 @@ gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt
     trace_settings settings = t->settings;
     settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
     v->frame.draw.pixel_step = 1;
-    v->frame.draw.renderer = t->renderer;
+    v->frame.draw.renderer = t->def.renderer;
     v->frame.draw.one_start = false;
     v->frame.draw.chance.share = 0;
     return frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, adjoint, err);

@@ -52,7 +52,6 @@ struct trainer {
 
     poses poses; /* likewise; count 0 without --refine-poses. Those that are learned are in `scene` */
 
-    gbt_renderer renderer; /* that the model is for */
     float voxel_size;
     double distance;                      /* from training cameras to anchors, in the median */
     double extent, first_scale_max;       /* an isolated point would start as a floater */

@@ -73,6 +73,17 @@ static void cholesky(void **state)
                 assert_near(sum, m[i * n + j], 1e-12 * (double)n);
                 assert_true(j <= i || !(fabs(l[i * n + j]) > 0));
             }
+        double x[MOST], b[MOST] = {0};
+        for (int i = 0; i < n; i++) {
+            x[i] = i - 1.5;
+            for (int j = 0; j < n; j++)
+                b[i] += m[i * n + j] * (j - 1.5);
+        }
+        symmetric_cholesky(m, m, n, 1e-300);
+        assert_memory_equal(m, l, (size_t)(n * n) * sizeof *m);
+        symmetric_solve(l, b, n);
+        for (int i = 0; i < n; i++)
+            assert_near(b[i], x[i], 1e-10 * (double)n);
     }
     const double singular[4] = {1, 1, 1, 1};
     double l[4];

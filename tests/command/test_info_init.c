@@ -270,7 +270,7 @@ static void init_refuses(void **state)
     (void)state;
     const char *data = write_grid("cloud.ply", 2, 0.0);
     const gbt_init_def good = gbt_init_def_default();
-    enum { BAD = 9 };
+    enum { BAD = 10 };
     gbt_init_def bad[BAD];
     for (int i = 0; i < BAD; i++)
         bad[i] = good;
@@ -283,6 +283,7 @@ static void init_refuses(void **state)
     bad[6] = (gbt_init_def){0};
     bad[7].init_count = -0.1;
     bad[8].init_count = 1.5;
+    bad[9].voxel_size = 1e10f;
     for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};
         assert_int_equal(gbt_init(data, &bad[i], in_folder("none.ply"), NULL, stdout, &err),

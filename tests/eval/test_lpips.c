@@ -188,17 +188,18 @@ static void files_compared(void **state)
     lpips *net = open_network(&alex, "alex.safetensors");
     image a = noise(40, 34, 3, 5), b = noise(40, 34, 3, 6);
     lpips_scores wanted;
-    double got[2];
+    gbt_comparison got;
     gbt_error err = {0};
     assert_ok(image_write(in_folder("a.png"), &a, NULL));
     assert_ok(image_write(in_folder("b.png"), &b, NULL));
     assert_ok(lpips_compare(net, &a, &b, NULL, 0, &wanted, NULL));
-    assert_ok(
-        gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("alex.safetensors"), got, NULL));
-    assert_near(got[0], wanted.lpips, 1e-6 * wanted.lpips);
-    assert_near(got[1], wanted.lpips_01, 1e-6 * wanted.lpips_01);
-    assert_int_equal(gbt_compare_lpips(in_folder("a.png"), in_folder("b.png"), in_folder("none"), got, &err),
-                     GBT_ERR_IO);
+    assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("b.png"), in_folder("alex.safetensors"), &got,
+                                 NULL));
+    assert_near(got.lpips, wanted.lpips, 1e-6 * wanted.lpips);
+    assert_near(got.lpips_01, wanted.lpips_01, 1e-6 * wanted.lpips_01);
+    assert_int_equal(
+        gbt_compare_images(in_folder("a.png"), in_folder("b.png"), in_folder("none"), &got, &err),
+        GBT_ERR_IO);
     image_free(&a);
     image_free(&b);
     lpips_close(net);

@@ -162,7 +162,7 @@ static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *sa
 }
 
 /* Wait for a save beside the steps. One that failed may not fail again: all is saved as it is now. */
-static gbt_status end_saving(const trainer *t, const run_paths *paths, save_beside *saving, gbt_error *err)
+static gbt_status end_saving(trainer *t, const run_paths *paths, save_beside *saving, gbt_error *err)
 {
     gbt_error why = {0};
     if (save_finish(saving, &why) == GBT_OK)
@@ -311,7 +311,7 @@ static bool holds_run(const run_paths *paths)
 }
 
 /* What a run has in its folder before its first step. */
-static gbt_status begin_files(const trainer *t, const char *run, const run_paths *paths,
+static gbt_status begin_files(trainer *t, const char *run, const run_paths *paths,
                               const gbt_train_def *def, const config_strings *strings, gbt_error *err)
 {
     if (def->overwrite && holds_run(paths))

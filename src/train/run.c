@@ -311,8 +311,8 @@ static bool holds_run(const run_paths *paths)
 }
 
 /* What a run has in its folder before its first step. */
-static gbt_status begin_files(trainer *t, const char *run, const run_paths *paths,
-                              const gbt_train_def *def, const config_strings *strings, gbt_error *err)
+static gbt_status begin_files(trainer *t, const char *run, const run_paths *paths, const gbt_train_def *def,
+                              const config_strings *strings, gbt_error *err)
 {
     if (def->overwrite && holds_run(paths))
         GBT_TRY(old_run_remove(run, err));

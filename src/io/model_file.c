@@ -12,14 +12,6 @@
 #include "io/model_code.h"
 #include "io/row_sections.h"
 
-void model_free(model *m)
-{
-    anchors_free(&m->anchors);
-    mem_free(m->anchor_pixel);
-    decoder_free(&m->decoder);
-    memset(m, 0, sizeof *m);
-}
-
 /* Scalars travel in three vectors; the enums name their places. */
 enum { SCENE_VOXEL_SIZE, SCENE_EXTENT, SCENE_T_NEAR, SCENE_BACKGROUND, SCENE_NUMBERS = SCENE_BACKGROUND + 3 };
 enum { DECODER_DISTANCE_SCALE, DECODER_DISTANCE_MIN, DECODER_DISTANCE_MAX, DECODER_NUMBERS };

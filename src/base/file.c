@@ -250,6 +250,11 @@ bool file_is_same(const char *a, const char *b)
            first.st_ino == second.st_ino;
 }
 
+size_t file_mark_bytes(const void *text, size_t count)
+{
+    return count >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+}
+
 bool file_is_one(const char *a, const char *b) { return strcmp(a, b) == 0 || file_is_same(a, b); }
 
 bool file_ends_with(const char *path, const char *ending)

@@ -94,6 +94,9 @@ bool file_is_folder(const char *path);
 /** Whether both are there, and are one file or folder, whatever they are called. */
 bool file_is_same(const char *a, const char *b);
 
+/** Bytes of the UTF-8 byte order mark that a text of `count` bytes begins with: 3 or 0. */
+size_t file_mark_bytes(const void *text, size_t count);
+
 /** Whether both name one file: the same path, or one file that is there. */
 bool file_is_one(const char *a, const char *b);
 

@@ -19,8 +19,7 @@ typedef struct text_lines {
 
 static text_lines lines_of(const source_file *file)
 {
-    const bool has_bom = file->size >= 3 && memcmp(file->bytes, "\xEF\xBB\xBF", 3) == 0;
-    return (text_lines){.file = file, .next = has_bom ? 3 : 0};
+    return (text_lines){.file = file, .next = file_mark_bytes(file->bytes, file->size)};
 }
 
 static raw_place place_of(const text_lines *lines)

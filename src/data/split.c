@@ -86,8 +86,7 @@ static bool is_missing(const scene *s, const char *name)
 static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *path, gbt_error *err)
 {
     size_t line = 0, missing = 0;
-    const bool has_mark = size >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0; /* of UTF-8 */
-    for (char *at = bytes + (has_mark ? 3 : 0); at < bytes + size;) {
+    for (char *at = bytes + file_mark_bytes(bytes, size); at < bytes + size;) {
         char *end = memchr(at, '\n', (size_t)(bytes + size - at));
         end = end != NULL ? end : bytes + size;
         char *next = end + 1;

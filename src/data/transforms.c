@@ -181,8 +181,7 @@ gbt_status transforms_read(const source_file *file, const char *folder, bool may
     if (file->size == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s:1: file is empty (wanted JSON)", file->name);
     json_error_t fault;
-    const bool has_mark = file->size >= 3 && memcmp(file->bytes, "\xef\xbb\xbf", 3) == 0; /* of UTF-8 */
-    const size_t first = has_mark ? 3 : 0;
+    const size_t first = file_mark_bytes(file->bytes, file->size);
     json_t *root =
         json_loadb((const char *)file->bytes + first, file->size - first, JSON_REJECT_DUPLICATES, &fault);
     if (root == NULL) {

@@ -82,9 +82,7 @@ gbt_status gbt_report(const char *run, const char *const *studies, size_t study_
     gbt_status status = r == NULL ? GBT_ERR_NO_MEMORY : read_scores(run, metrics, &e, err);
     if (status == GBT_OK) {
         const gbt_status opened = loaded_run_open(run, NULL, 0, r, &why);
-        char *hint = strstr(why.text, "; `data`"); /* an option that this has not */
-        if (hint != NULL)
-            *hint = '\0';
+        loaded_run_cut_hint(why.text);
         if (opened != GBT_OK)
             log_warn("no maps and layers: %s", why.text);
         status = report_write(run, &e, metrics,

@@ -194,6 +194,14 @@ static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
     return GBT_OK;
 }
 
+bool loaded_run_cut_hint(char *text)
+{
+    char *hint = strstr(text, "; `data`");
+    if (hint != NULL)
+        *hint = '\0';
+    return hint != NULL;
+}
+
 gbt_status loaded_run_open_views(const char *run, const char *data, double downscale, loaded_run *out,
                                  gbt_error *err)
 {

@@ -42,6 +42,9 @@ typedef struct loaded_run {
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
                            gbt_error *err);
 
+/** Cut off what an error of it says of `data`, for programs that cannot name it then. Whether it did. */
+bool loaded_run_cut_hint(char *text);
+
 /** GBT_ERR_ARGUMENT when it holds plain Gaussians, `run` is their file, and anchors are wanted. */
 gbt_status loaded_run_need_anchors(const loaded_run *r, const char *run, gbt_error *err);
 

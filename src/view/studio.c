@@ -33,12 +33,10 @@ static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_s
     if (s->data != NULL)
         return base_fail(err, status, "%s", first.text);
     GBT_TRY(loaded_run_open_model(s->input, run, err));
-    char *hint = strstr(first.text, "; `data`"); /* as the library calls it */
-    if (hint != NULL)
-        *hint = '\0';
+    const bool hint = loaded_run_cut_hint(first.text);
     if (run->cloud.count == 0)
         snprintf(note, note_size, "No photos: %.500s%s", first.text,
-                 hint != NULL ? "; where it is now can be said when the viewer is started" : "");
+                 hint ? "; where it is now can be said when the viewer is started" : "");
     return GBT_OK;
 }
 

@@ -134,8 +134,9 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
     }
     current.done = done;
     const double seconds = clock_wall() - current.start;
-    /* A person is told in other words when a stage ends. */
-    const bool tells = is_due() || (done == total && (listener != NULL || line_is_open));
+    /* A person is told in other words when a stage ends, and nothing of what is not yet done. */
+    const bool tells =
+        ((done > 0 || listener != NULL) && is_due()) || (done == total && (listener != NULL || line_is_open));
     pthread_mutex_unlock(&lock);
     if (!tells)
         return;

@@ -1,69 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/data/data_support.h -- temporary folders, exact-size copies, and mutations of good files. */
+/* tests/data/data_support.h -- pictures, exact-size copies, and mutations of good files. */
 #ifndef GBT_TEST_DATA_SUPPORT_H
 #define GBT_TEST_DATA_SUPPORT_H
 
-#include "test_support.h"
+#include "folder.h"
 
-#include <math.h>
-#include <unistd.h>
-
-#include "base/file.h"
 #include "base/image.h"
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 #include "data/raw.h"
-#include "remove_tree.h"
-
-/** cmocka set-up and tear-down: *state is the path of an empty folder. */
-static inline int make_temporary(void **state)
-{
-    const char *root = getenv("TMPDIR");
-    char *path = malloc(4096);
-    snprintf(path, 4096, "%s/gbt_data_XXXXXX", root != NULL ? root : "/tmp");
-    *state = mkdtemp(path);
-    return *state != NULL ? 0 : -1;
-}
-
-static inline int remove_temporary(void **state)
-{
-    remove_tree(*state);
-    free(*state);
-    return 0;
-}
-
-/** folder/name; `slot` in 0..3 says which static buffer. */
-static inline const char *inside(const char *folder, const char *name, int slot)
-{
-    static char paths[4][8192];
-    snprintf(paths[slot], sizeof paths[slot], "%s/%s", folder, name);
-    return paths[slot];
-}
-
-static inline void make_parent(const char *path)
-{
-    char parent[4096];
-    snprintf(parent, sizeof parent, "%.*s", (int)(strrchr(path, '/') - path), path);
-    assert_ok(file_make_folder(parent, &assert_ok_err_));
-}
-
-static inline void write_bytes(const char *folder, const char *name, const void *bytes, size_t size)
-{
-    const char *path = inside(folder, name, 3);
-    make_parent(path);
-    assert_ok(file_write_atomic(path, bytes, size, &assert_ok_err_));
-}
-
-static inline void write_text(const char *folder, const char *name, const char *text)
-{
-    write_bytes(folder, name, text, strlen(text));
-}
 
 /** A picture whose pixel (x, y) is (x, y, 0) / 255. */
-static inline void write_picture(const char *folder, const char *name, int width, int height)
+static inline void write_picture(const char *path, int width, int height)
 {
-    const char *path = inside(folder, name, 3);
-    make_parent(path);
+    make_folder_of(path);
     image im = {0};
     assert_ok(image_alloc(&im, width, height, 3, &assert_ok_err_));
     for (int y = 0; y < height; y++)

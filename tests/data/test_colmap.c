@@ -745,30 +745,28 @@ static void check_trip(const trip *t, const scene *s)
         }
 }
 
-static void write_trip_photos(const trip *t, const char *folder)
+static void write_trip_photos(const trip *t)
 {
     for (size_t i = 0; i < TRIP_IMAGES; i++) {
-        char name[64];
-        snprintf(name, sizeof name, "images/%s", t->names[i]);
-        write_text(folder, name, "not read here");
+        write_text(in_folder("images/%s", t->names[i]), "not read here");
     }
 }
 
 static void round_trip(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     trip *t = malloc(sizeof *t);
     scene binary, text;
     build_trip(t);
-    write_trip_photos(t, folder);
-    assert_ok(colmap_write(inside(folder, "sparse/0", 0), t->images, TRIP_IMAGES, t->points, TRIP_POINTS,
-                           &assert_ok_err_));
-    assert_ok(scene_load(folder, NULL, &binary, &assert_ok_err_));
+    write_trip_photos(t);
+    assert_ok(
+        colmap_write(in_folder("sparse/0"), t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &binary, &assert_ok_err_));
     assert_string_equal(binary.source, "colmap-bin");
     check_trip(t, &binary);
     /* The text twin says exactly the same. */
-    colmap_to_text(inside(folder, "sparse/0", 0));
-    assert_ok(scene_load(folder, NULL, &text, &assert_ok_err_));
+    colmap_to_text(in_folder("sparse/0"));
+    assert_ok(scene_load(test_folder, NULL, &text, &assert_ok_err_));
     assert_string_equal(text.source, "colmap-txt");
     check_trip(t, &text);
     assert_memory_equal(binary.origin, text.origin, sizeof text.origin);
@@ -790,13 +788,13 @@ static void round_trip(void **state)
 /* Identical intrinsics share a camera: 2 kinds among 9 images. */
 static void writer_shares_cameras(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     trip *t = malloc(sizeof *t);
     build_trip(t);
-    assert_ok(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &assert_ok_err_));
+    assert_ok(colmap_write(test_folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &assert_ok_err_));
     unsigned char *bytes;
     size_t size;
-    assert_ok(file_read(inside(folder, "cameras.bin", 0), &bytes, &size, &assert_ok_err_));
+    assert_ok(file_read(in_folder("cameras.bin"), &bytes, &size, &assert_ok_err_));
     assert_int_equal(bytes[0], 2);
     assert_int_equal(size, 8 + (24 + 8 * 8) + (24 + 4 * 8));
     mem_free(bytes);
@@ -805,7 +803,7 @@ static void writer_shares_cameras(void **state)
 
 static void writer_refuses(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     trip *t = malloc(sizeof *t);
     for (int i = 0; i < 5; i++) {
         build_trip(t);
@@ -827,10 +825,10 @@ static void writer_refuses(void **state)
             break;
         }
         gbt_error err = {0};
-        assert_int_equal(colmap_write(folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err),
+        assert_int_equal(colmap_write(test_folder, t->images, TRIP_IMAGES, t->points, TRIP_POINTS, &err),
                          GBT_ERR_ARGUMENT);
         check_message(GBT_ERR_ARGUMENT, &err);
-        assert_false(file_exists(inside(folder, "cameras.bin", 0)));
+        assert_false(file_exists(in_folder("cameras.bin")));
     }
     free(t);
 }
@@ -885,9 +883,9 @@ int main(void)
         cmocka_unit_test(mutations_of_binary),
         cmocka_unit_test(mutations_of_text),
         cmocka_unit_test(very_long_line),
-        cmocka_unit_test_setup_teardown(round_trip, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(writer_shares_cameras, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(writer_refuses, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(round_trip, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(writer_shares_cameras, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(writer_refuses, folder_make, folder_remove),
     };
     static struct CMUnitTest tests[BIN + TXT];
     for (size_t i = 0; i < BIN; i++)

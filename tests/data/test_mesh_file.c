@@ -122,13 +122,14 @@ static void bad(void **state)
 
 static void files(void **state)
 {
+    (void)state;
     mesh_data mesh;
     gbt_error why = {0};
-    write_text(*state, "a.obj", V3 "f 1 2 3\n");
-    assert_ok(mesh_file_read(inside(*state, "a.obj", 0), &mesh, &assert_ok_err_));
+    write_text(in_folder("a.obj"), V3 "f 1 2 3\n");
+    assert_ok(mesh_file_read(in_folder("a.obj"), &mesh, &assert_ok_err_));
     assert_int_equal(mesh.triangle_count, 1);
     mesh_data_free(&mesh);
-    assert_int_equal(mesh_file_read(inside(*state, "none.obj", 0), &mesh, &why), GBT_ERR_IO);
+    assert_int_equal(mesh_file_read(in_folder("none.obj"), &mesh, &why), GBT_ERR_IO);
     mesh_data_free(&mesh);
 }
 
@@ -186,7 +187,7 @@ int main(void)
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(bad),
         cmocka_unit_test(mutations),
-        cmocka_unit_test_setup_teardown(files, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(files, folder_make, folder_remove),
     };
     const int failures = cmocka_run_group_tests_name("meshes", tests, NULL, NULL);
     return failures + cmocka_run_group_tests_name("mesh files", fixed, NULL, NULL);

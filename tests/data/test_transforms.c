@@ -6,15 +6,12 @@
 #include "base/near.h"
 #include "data/transforms.h"
 
-/* The photos of the cases: a.png of 8 x 6 pixels, and sub/b.jpg. One folder for all, made by main(): a
-   group's set-up would replace the rows that the tests get as their state. */
-static char *folder_of_photos;
-
+/* The photos of the cases, in one folder for all: a.png of 8 x 6 pixels, and sub/b.jpg. */
 static gbt_status read_json(const char *text, size_t size, raw_scene *raw, char **points_name, gbt_error *err)
 {
     unsigned char *copy = exact_copy(text, size);
     const source_file file = {"transforms.json", copy, size};
-    const gbt_status status = transforms_read(&file, folder_of_photos, false, raw, points_name, err);
+    const gbt_status status = transforms_read(&file, test_folder, false, raw, points_name, err);
     free(copy);
     return status;
 }
@@ -420,7 +417,7 @@ static void try_json(const unsigned char *bytes, size_t size, void *context)
     raw_scene raw = {0};
     char *points_name = NULL;
     gbt_error err = {0};
-    const gbt_status status = transforms_read(&file, folder_of_photos, false, &raw, &points_name, &err);
+    const gbt_status status = transforms_read(&file, test_folder, false, &raw, &points_name, &err);
     check_message(status, &err);
     if (status == GBT_OK) {
         check_raw(&raw);
@@ -457,14 +454,11 @@ int main(void)
         cmocka_unit_test(deep_nesting), cmocka_unit_test(missing_frames_are_counted),
         cmocka_unit_test(mutations),    cmocka_unit_test(rolling_shutters),
     };
-    void *folder = NULL;
-    if (make_temporary(&folder) != 0)
+    if (folder_make(NULL) != 0)
         return 1;
-    folder_of_photos = folder;
-    write_picture(folder, "a.png", 8, 6);
-    write_text(folder, "sub/b.jpg", "not read here");
+    write_picture(in_folder("a.png"), 8, 6);
+    write_text(in_folder("sub/b.jpg"), "not read here");
     int failures = cmocka_run_group_tests_name("transforms, tables", tests, NULL, NULL);
     failures += cmocka_run_group_tests_name("transforms", fixed, NULL, NULL);
-    remove_temporary(&folder);
-    return failures;
+    return failures + folder_remove(NULL);
 }

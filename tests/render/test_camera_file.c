@@ -1,36 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_camera_file.c -- camera files: what each field means, and one clear line about what is
    wrong. */
-#include <unistd.h>
-
 #include "base/near.h"
 #include "exr_file.h"
+#include "folder.h"
 #include "render/camera_file.h"
 
-static char folder[] = "/tmp/gbt_camera_XXXXXX", path[64], rays_path[64];
+static const char *path;
 static const double none[3] = {0, 0, 0};
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (mkdtemp(folder) == NULL)
-        return -1;
-    snprintf(path, sizeof path, "%s/c.json", folder);
-    snprintf(rays_path, sizeof rays_path, "%s/r.exr", folder);
-    return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    unlink(path);
-    unlink(rays_path);
-    return rmdir(folder);
-}
-
-static void write_text(const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), &assert_ok_err_));
+    const int failed = folder_make(state);
+    path = in_folder("c.json");
+    return failed;
 }
 
 #define POSE                                                                                                 \
@@ -40,7 +23,7 @@ static camera_file read_good(const char *text, const double origin[3])
 {
     camera_file file;
     gbt_error err = {0};
-    write_text(text);
+    write_text(path, text);
     if (camera_file_read(path, origin, &file, &err) != GBT_OK)
         fail_msg("%s: %s", text, err.text);
     return file;
@@ -127,10 +110,10 @@ static void rays_beside_it(void **state)
     static const char *const names[] = {"dx", "dy", "dz", "ox", "oy", "oz"};
     const float pixels[12] = {0, 0, 2, 10, 20, 30, 0, 3, 4, 11, 21, 31};
     const double shift[3] = {10, 20, 30};
-    exr_write(rays_path, 2, 1, 6, names, 2, pixels);
+    exr_write(in_folder("r.exr"), 2, 1, 6, names, 2, pixels);
     camera_file f;
     gbt_error err = {0};
-    write_text("{\"rays\": \"r.exr\"}");
+    write_text(path, "{\"rays\": \"r.exr\"}");
     if (camera_file_read(path, shift, &f, &err) != GBT_OK)
         fail_msg("%s", err.text);
     assert_ptr_equal(f.shot.given, &f.rays);
@@ -220,7 +203,7 @@ static void says_what_is_wrong(void **state)
     for (size_t i = 0; i < sizeof bad_cases / sizeof *bad_cases; i++) {
         camera_file f;
         gbt_error err = {0};
-        write_text(bad_cases[i].text);
+        write_text(path, bad_cases[i].text);
         const gbt_status status = camera_file_read(path, none, &f, &err);
         const size_t length = strlen(path);
         if (status != GBT_ERR_FORMAT || strncmp(err.text, path, length) != 0 ||
@@ -233,7 +216,7 @@ static void says_what_is_wrong(void **state)
     gbt_error err = {0};
     assert_int_equal(camera_file_read("/nowhere/c.json", none, &f, &err), GBT_ERR_IO);
     camera_file_free(&f);
-    write_text("{\"rays\": \"nothing.exr\"}");
+    write_text(path, "{\"rays\": \"nothing.exr\"}");
     memset(&err, 0, sizeof err);
     assert_int_equal(camera_file_read(path, none, &f, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "nothing.exr: cannot open"));
@@ -247,5 +230,5 @@ int main(void)
         cmocka_unit_test(aperture_and_shutter), cmocka_unit_test(rays_beside_it),
         cmocka_unit_test(says_what_is_wrong),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

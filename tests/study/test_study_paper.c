@@ -446,8 +446,8 @@ static void runs_are_made_once(void **state)
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++)
             before[v][seed] = time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed));
-    bytes csv = read_bytes(in_root("paper/paper.csv"));
-    bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
+    file_bytes csv = read_bytes(in_root("paper/paper.csv"));
+    file_bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
     assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data,
                                 metrics.count / 2, NULL)); /* damaged */
     /* interrupted */
@@ -494,7 +494,7 @@ static void runs_are_made_once(void **state)
     paper_ok(&other, in_root("paper"));
     data[0] = "tiny";
     assert_non_null(getcwd(here, sizeof here));
-    assert_int_equal(chdir(root), 0);
+    assert_int_equal(chdir(test_folder), 0);
     paper_ok(&other, in_root("paper"));
     assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), made));
     assert_int_equal(chdir(in_root("other")), 0);
@@ -785,5 +785,5 @@ int main(void)
         cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
         cmocka_unit_test(data_named_in_latin_1),  cmocka_unit_test(a_photo_masked_whole),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

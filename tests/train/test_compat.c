@@ -358,5 +358,5 @@ int main(void)
         cmocka_unit_test(voxels_are_where_the_world_puts_them),
         cmocka_unit_test(scenes_of_blender_lie_on_black),
     };
-    return cmocka_run_group_tests_name("compat", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("compat", tests, make_root, folder_remove);
 }

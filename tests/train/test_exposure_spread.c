@@ -113,5 +113,5 @@ int main(void)
         cmocka_unit_test(photos_without_room_count),
         cmocka_unit_test(found_exposures_can_be_left),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

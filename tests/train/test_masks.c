@@ -358,7 +358,7 @@ static void what_is_held_out_is_looked_at_first(void **state)
     snprintf(mask, sizeof mask, "%s/masks/%.60s.png", folder, s.views[0].name);
     const char *photo = s.views[0].path, *run = in_root("held_run");
     const gbt_train_def def = run_def();
-    const bytes whole = read_bytes(photo);
+    const file_bytes whole = read_bytes(photo);
 
     assert_ok(file_write_atomic(photo, whole.data, whole.count - 20, NULL));
     train_fails(folder, run, &def, GBT_ERR_FORMAT, "PNG is truncated");
@@ -584,5 +584,5 @@ int main(void)
         cmocka_unit_test(transparent_parts_lie_on_the_colour_asked_for),
         cmocka_unit_test(steps_lay_photos_on_their_background),
     };
-    return cmocka_run_group_tests_name("masks", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("masks", tests, make_root, folder_remove);
 }

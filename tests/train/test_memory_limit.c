@@ -131,5 +131,5 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_same_run_in_less_memory),
                                        cmocka_unit_test(too_little), cmocka_unit_test(what_it_takes)};
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -152,8 +152,8 @@ static void a_run_goes_on_with_its_poses(void **state)
     train_ok(NULL, in_root("parts"), &def);
     const char *const files[] = {"model.gbt", "poses.json"};
     for (int i = 0; i < 2; i++) {
-        const bytes a = read_bytes(in_root("whole/%s", files[i])),
-                    b = read_bytes(in_root("parts/%s", files[i]));
+        const file_bytes a = read_bytes(in_root("whole/%s", files[i])),
+                         b = read_bytes(in_root("parts/%s", files[i]));
         assert_int_equal(a.count, b.count);
         assert_memory_equal(a.data, b.data, a.count);
         mem_free(a.data);
@@ -185,12 +185,12 @@ static void held_out_photos_are_aligned_after_a_signal(void **state)
     train_fails(tiny, in_root("stopped"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
     assert_int_equal(pthread_join(thread, NULL), 0);
     signal(SIGTERM, SIG_DFL);
-    bytes before = read_bytes(summary);
+    file_bytes before = read_bytes(summary);
     def.resume = true;
     train_ok(NULL, in_root("stopped"), &def);
     assert_same_file(in_root("unstopped/model.gbt"), in_root("stopped/model.gbt"));
     assert_same_file(in_root("unstopped/poses.json"), in_root("stopped/poses.json"));
-    bytes after = read_bytes(summary);
+    file_bytes after = read_bytes(summary);
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.data, after.data, before.count);
     mem_free(before.data);
@@ -214,11 +214,6 @@ static void whoever_opens_the_run_has_them(void **state)
     assert_true(moved > 1e-6 && moved < 0.1);
     loaded_run_close(&run);
     loaded_run_close(&of_data);
-}
-
-static void write_text(const char *path, const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
 }
 
 static void what_is_no_pose_is_refused(void **state)
@@ -278,5 +273,5 @@ int main(void)
         cmocka_unit_test(whoever_opens_the_run_has_them),
         cmocka_unit_test(what_is_no_pose_is_refused),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -37,7 +37,7 @@ static void last_row(const char *run, double *step, double *progress, double *lo
 {
     char path[PATH_SIZE];
     snprintf(path, sizeof path, "%s/log.csv", run);
-    bytes log = read_bytes(path);
+    file_bytes log = read_bytes(path);
     const char *end = (const char *)log.data + log.count - 1;
     while (end > (const char *)log.data && end[-1] != '\n')
         end--;
@@ -115,11 +115,11 @@ static void a_length_that_has_passed_is_refused(void **state)
     const char *run = in_root("passed");
     const gbt_train_def def = run_def(), shorter = resume_def(STEPS - 1, 0);
     train_ok(tiny, run, &def);
-    bytes model_bytes = read_bytes(in_root("passed/model.gbt")),
-          config = read_bytes(in_root("passed/config"));
+    file_bytes model_bytes = read_bytes(in_root("passed/model.gbt")),
+               config = read_bytes(in_root("passed/config"));
     train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "wanted more than the 60 that it has done");
-    bytes model_after = read_bytes(in_root("passed/model.gbt")),
-          config_after = read_bytes(in_root("passed/config"));
+    file_bytes model_after = read_bytes(in_root("passed/model.gbt")),
+               config_after = read_bytes(in_root("passed/config"));
     assert_int_equal(model_bytes.count, model_after.count);
     assert_memory_equal(model_bytes.data, model_after.data, model_bytes.count);
     assert_int_equal(config.count, config_after.count);
@@ -137,11 +137,11 @@ static void nothing_left_changes_nothing(void **state)
     const char *run = in_root("whole");
     const gbt_train_def def = run_def(), on = resume_def(0, 0), same = resume_def(STEPS, 0);
     train_ok(tiny, run, &def);
-    bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
     train_ok(tiny, run, &on);
     train_ok(tiny, run, &same);
-    bytes summary_after = read_bytes(in_root("whole/train.json")),
-          log_after = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary_after = read_bytes(in_root("whole/train.json")),
+               log_after = read_bytes(in_root("whole/log.csv"));
     assert_int_equal(summary.count, summary_after.count);
     assert_memory_equal(summary.data, summary_after.data, summary.count);
     assert_int_equal(log.count, log_after.count);
@@ -248,11 +248,6 @@ static void what_a_run_left_alone_stays(void **state)
     assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
 }
 
-static void write_text(const char *path, const char *text)
-{
-    assert_ok(file_write_atomic(path, text, strlen(text), NULL));
-}
-
 /* What becomes of the list that was named, and where the run is gone on with, decides nothing. */
 static void a_list_of_held_out_photos_is_the_runs_own(void **state)
 {
@@ -271,7 +266,7 @@ static void a_list_of_held_out_photos_is_the_runs_own(void **state)
     const gbt_train_def on = resume_def(0, 0);
     train_ok(tiny, in_root("list"), &on);
     assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
-    bytes config = read_bytes(in_root("list/config"));
+    file_bytes config = read_bytes(in_root("list/config"));
     assert_non_null(strstr((const char *)config.data, wanted));
     mem_free(config.data);
     /* A run of an older version has none. */
@@ -336,5 +331,5 @@ int main(void)
         cmocka_unit_test(an_overwritten_run_is_gone),
         cmocka_unit_test(a_list_of_held_out_photos_is_the_runs_own),
     };
-    return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("resume", tests, make_root, folder_remove);
 }

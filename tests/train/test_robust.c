@@ -34,13 +34,6 @@ static const char *joined(const char *folder, const char *name)
 
 /* ---- scenes ---- */
 
-static void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
-    mem_free(b.data);
-}
-
 /* A data set like `from`, whose photos `change` has gone over. They become EXR files under their old names:
    magic decides. */
 static void copy_scene(const char *from, const char *folder, void (*change)(image *photo, size_t view))
@@ -49,7 +42,6 @@ static void copy_scene(const char *from, const char *folder, void (*change)(imag
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     assert_ok(scene_load(from, &split, &s, NULL));
     assert_ok(file_make_folder(joined(folder, "images"), NULL));
-    assert_ok(file_make_folder(joined(folder, "sparse/0"), NULL));
     static const char *const models[] = {"sparse/0/cameras.bin", "sparse/0/images.bin",
                                          "sparse/0/points3D.bin"};
     for (int i = 0; i < 3; i++)
@@ -92,7 +84,7 @@ static const char *poisoned_scene(void)
 
 static void assert_no_nan_in_text(const char *path)
 {
-    bytes b = read_bytes(path);
+    file_bytes b = read_bytes(path);
     const char *text = (const char *)b.data;
     static const char *const words[] = {"nan", "NaN", "inf", "Inf"};
     for (int i = 0; i < 4; i++)
@@ -1102,5 +1094,5 @@ int main(void)
         cmocka_unit_test(a_far_anchor_does_not_move_the_others),
         cmocka_unit_test(scoring_stops_at_a_signal),
     };
-    return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("robust training", tests, make_root, folder_remove);
 }

@@ -68,5 +68,5 @@ static void motion_is_followed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(motion_is_followed)};
-    return cmocka_run_group_tests_name("rolling shutters", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("rolling shutters", tests, make_root, folder_remove);
 }

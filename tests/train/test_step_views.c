@@ -232,5 +232,5 @@ int main(void)
         cmocka_unit_test(rates_follow_the_views),        cmocka_unit_test(rounds_count_views),
         cmocka_unit_test(views_are_a_power_of_two),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -1013,7 +1013,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
 {
     (void)state;
     static const char *const files[] = {"model.gbt", "config", "log.csv", "checkpoints/last.gbt"};
-    bytes before[4];
+    file_bytes before[4];
     gbt_train_def def = run_def();
     def.iterations = 3;
     def.stop_at_step = 2;
@@ -1024,7 +1024,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     def.stop_at_step = 0;
     train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
     for (int i = 0; i < 4; i++) {
-        bytes after = read_bytes(in_root("kept/%s", files[i]));
+        file_bytes after = read_bytes(in_root("kept/%s", files[i]));
         assert_int_equal(before[i].count, after.count);
         assert_memory_equal(before[i].data, after.data, after.count);
         mem_free(before[i].data);
@@ -1059,7 +1059,7 @@ static void a_vanished_photo_is_named(void **state)
     gbt_train_def def = run_def();
     def.stop_at_step = 3;
     train_fails(data, run, &def, GBT_ERR_INTERRUPTED, "after step 3");
-    bytes before = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+    file_bytes before = read_bytes(in_root("vanished/checkpoints/last.gbt"));
 
     trainer t;
     open_ok(&t, data, &def);
@@ -1073,7 +1073,7 @@ static void a_vanished_photo_is_named(void **state)
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
     train_fails(data, run, &on, GBT_ERR_FORMAT, strrchr(photo, '/') + 1);
-    bytes after = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+    file_bytes after = read_bytes(in_root("vanished/checkpoints/last.gbt"));
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.data, after.data, before.count);
     mem_free(before.data);
@@ -1090,10 +1090,10 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     def.stop_at_step = 10;
     train_fails(tiny, in_root("full"), &def, GBT_ERR_INTERRUPTED, "after step 10");
     const char *last = in_root("full/checkpoints/last.gbt"), *copy = in_root("full_copy.gbt");
-    bytes old = read_bytes(last);
+    file_bytes old = read_bytes(last);
     assert_ok(file_write_atomic(copy, old.data, old.count, NULL));
     mem_free(old.data);
-    bytes old_model = read_bytes(in_root("full/model.gbt"));
+    file_bytes old_model = read_bytes(in_root("full/model.gbt"));
 
     fflush(NULL);
     struct rlimit limit;
@@ -1113,7 +1113,7 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     /* Whole, and under its own name; no half-written file beside it. */
     assert_true(file_exists(last) && is_same_file(last, copy));
     assert_false(file_exists(in_root("full/checkpoints/.last.gbt.tmp")));
-    bytes new_model = read_bytes(in_root("full/model.gbt"));
+    file_bytes new_model = read_bytes(in_root("full/model.gbt"));
     assert_int_equal(new_model.count, old_model.count);
     assert_memory_equal(new_model.data, old_model.data, old_model.count);
     mem_free(old_model.data);
@@ -1137,7 +1137,7 @@ static void a_damaged_checkpoint_is_refused(void **state)
     def.stop_at_step = 5;
     train_fails(tiny, in_root("damaged"), &def, GBT_ERR_INTERRUPTED, "after step 5");
     const char *path = in_root("damaged/checkpoints/last.gbt");
-    bytes whole = read_bytes(path);
+    file_bytes whole = read_bytes(path);
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
     static const double cuts[] = {0, 1e-4, 0.01, 0.5, 0.999999}; /* parts of the file that are left */
@@ -1156,7 +1156,7 @@ static void a_damaged_checkpoint_is_refused(void **state)
     write_file(in_root("damaged/checkpoints/last.gbt.prev"), whole.data, whole.count);
     on.stop_at_step = 6;
     train_fails(tiny, in_root("damaged"), &on, GBT_ERR_INTERRUPTED, "after step 6");
-    bytes kept = read_bytes(in_root("damaged/checkpoints/last.gbt.prev")); /* not the damaged one */
+    file_bytes kept = read_bytes(in_root("damaged/checkpoints/last.gbt.prev")); /* not the damaged one */
     assert_int_equal(kept.count, whole.count);
     assert_memory_equal(kept.data, whole.data, whole.count);
     mem_free(kept.data);
@@ -2053,5 +2053,5 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_foreign_checkpoint_is_refused),
         cmocka_unit_test(every_allocation_may_fail),
     };
-    return _cmocka_run_group_tests("trainer", tests, sizeof tests / sizeof *tests, make_root, remove_root);
+    return _cmocka_run_group_tests("trainer", tests, sizeof tests / sizeof *tests, make_root, folder_remove);
 }

@@ -109,7 +109,7 @@ static int train_once(void **state)
 static int clean_up(void **state)
 {
     free(run_folder);
-    return remove_root(state);
+    return folder_remove(state);
 }
 
 /* ---- pictures ---- */
@@ -386,13 +386,6 @@ static void wait_for_version(int port, int version)
     fail_msg("version %d has not come", version);
 }
 
-static void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, NULL));
-    mem_free(b.data);
-}
-
 static void newer_models_are_shown(void **state)
 {
     (void)state;
@@ -400,7 +393,6 @@ static void newer_models_are_shown(void **state)
     gbt_train_def def = run_def();
     viewer v;
     snprintf(model, sizeof model, "%s/model.gbt", live);
-    assert_ok(file_make_folder(live, NULL));
     copy_file(in_root("run/config"), in_root("live/config"));
     const int port = open_viewer(&v, live);
     reply none = http_get(port, "/scene");

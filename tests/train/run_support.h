@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/run_support.h -- a tiny scene to train on, and runs that must succeed or
-   fail.
+/* tests/train/run_support.h -- a tiny scene to train on, and runs that must succeed or fail.
 
    The scene is tiny (photos of 48 x 36), so a run takes a fraction of a second. */
 #ifndef GBT_TESTS_RUN_SUPPORT_H
@@ -12,8 +11,6 @@
 #include "train/trainer.h"
 
 enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
-
-#define in_root in_folder
 
 static const char *tiny;
 

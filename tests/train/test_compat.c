@@ -328,7 +328,7 @@ static void write_blender(const char *folder)
 static void scenes_of_blender_lie_on_black(void **state)
 {
     (void)state;
-    const char *folder = in_root("blender");
+    const char *folder = in_folder("blender");
     write_blender(folder);
     for (int compat = 0; compat <= 1; compat++) {
         const gbt_train_def def = def_of(compat == 1);

@@ -7,7 +7,7 @@
 /* The photos of a scene of its own, each times 2^(stops * something in [-1, 1]). */
 static const char *exposed_scene(const char *name, double stops)
 {
-    const char *folder = in_root("%s", name);
+    const char *folder = in_folder("%s", name);
     scene s;
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     make_tiny_scene(folder);

@@ -52,7 +52,7 @@ static void a_finished_run_goes_on(void **state)
     double step, progress, loss[2];
     for (int i = 0; i < 2; i++) {
         gbt_set_threads(i + 1);
-        const char *run = in_root("further%d", i);
+        const char *run = in_folder("further%d", i);
         gbt_train_def def = run_def(), on = resume_def(2 * STEPS, 0);
         def.background = GBT_BACKGROUND_SKY; /* losses on random backgrounds could not be compared */
         train_ok(tiny, run, &def);
@@ -65,9 +65,9 @@ static void a_finished_run_goes_on(void **state)
         assert_true(number_of(run, "iterations") == 2 * STEPS);
     }
     gbt_set_threads(before);
-    assert_same_file(in_root("further0/model.gbt"), in_root("further1/model.gbt"));
+    assert_same_file(in_folder("further0/model.gbt"), in_folder("further1/model.gbt"));
     model m;
-    assert_ok(model_load(in_root("further0/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("further0/model.gbt"), &m, NULL));
     assert_int_equal(m.iterations, 2 * STEPS);
     assert_non_null(strstr(m.config, "\niterations = 120\n"));
     model_free(&m);
@@ -79,19 +79,19 @@ static void the_new_length_decides(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("straight"), &def);
+    train_ok(tiny, in_folder("straight"), &def);
     def.iterations = 3 * STEPS;
     def.stop_at_step = 1;
-    train_fails(tiny, in_root("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
+    train_fails(tiny, in_folder("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
     const gbt_train_def on = resume_def(STEPS, 0);
-    train_ok(tiny, in_root("stretched"), &on);
-    assert_same_file(in_root("straight/model.gbt"), in_root("stretched/model.gbt"));
+    train_ok(tiny, in_folder("stretched"), &on);
+    assert_same_file(in_folder("straight/model.gbt"), in_folder("stretched/model.gbt"));
 }
 
 static void a_run_goes_on_for_a_time(void **state)
 {
     (void)state;
-    const char *run = in_root("timed");
+    const char *run = in_folder("timed");
     const gbt_train_def def = run_def();
     train_ok(tiny, run, &def);
     for (int i = 1; i <= 2; i++) { /* from a number of steps, and from a budget */
@@ -112,14 +112,14 @@ static void a_run_goes_on_for_a_time(void **state)
 static void a_length_that_has_passed_is_refused(void **state)
 {
     (void)state;
-    const char *run = in_root("passed");
+    const char *run = in_folder("passed");
     const gbt_train_def def = run_def(), shorter = resume_def(STEPS - 1, 0);
     train_ok(tiny, run, &def);
-    file_bytes model_bytes = read_bytes(in_root("passed/model.gbt")),
-               config = read_bytes(in_root("passed/config"));
+    file_bytes model_bytes = read_bytes(in_folder("passed/model.gbt")),
+               config = read_bytes(in_folder("passed/config"));
     train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "wanted more than the 60 that it has done");
-    file_bytes model_after = read_bytes(in_root("passed/model.gbt")),
-               config_after = read_bytes(in_root("passed/config"));
+    file_bytes model_after = read_bytes(in_folder("passed/model.gbt")),
+               config_after = read_bytes(in_folder("passed/config"));
     assert_int_equal(model_bytes.count, model_after.count);
     assert_memory_equal(model_bytes.data, model_after.data, model_bytes.count);
     assert_int_equal(config.count, config_after.count);
@@ -134,14 +134,15 @@ static void a_length_that_has_passed_is_refused(void **state)
 static void nothing_left_changes_nothing(void **state)
 {
     (void)state;
-    const char *run = in_root("whole");
+    const char *run = in_folder("whole");
     const gbt_train_def def = run_def(), on = resume_def(0, 0), same = resume_def(STEPS, 0);
     train_ok(tiny, run, &def);
-    file_bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary = read_bytes(in_folder("whole/train.json")),
+               log = read_bytes(in_folder("whole/log.csv"));
     train_ok(tiny, run, &on);
     train_ok(tiny, run, &same);
-    file_bytes summary_after = read_bytes(in_root("whole/train.json")),
-               log_after = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary_after = read_bytes(in_folder("whole/train.json")),
+               log_after = read_bytes(in_folder("whole/log.csv"));
     assert_int_equal(summary.count, summary_after.count);
     assert_memory_equal(summary.data, summary_after.data, summary.count);
     assert_int_equal(log.count, log_after.count);
@@ -151,7 +152,7 @@ static void nothing_left_changes_nothing(void **state)
     mem_free(summary_after.data);
     mem_free(log_after.data);
     /* A kill may come after the checkpoint and before the summary. */
-    assert_int_equal(remove(in_root("whole/train.json")), 0);
+    assert_int_equal(remove(in_folder("whole/train.json")), 0);
     train_ok(tiny, run, &on);
     assert_true(number_of(run, "iterations") == STEPS);
 }
@@ -162,14 +163,14 @@ static void the_run_knows_its_data(void **state)
     char here[PATH_SIZE];
     assert_non_null(getcwd(here, sizeof here));
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("named"), &def);
+    train_ok(tiny, in_folder("named"), &def);
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("own"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    train_fails(tiny, in_folder("own"), &def, GBT_ERR_INTERRUPTED, "after step 5");
     assert_int_equal(chdir("/"), 0);
     const gbt_train_def on = resume_def(0, 0);
-    train_ok(NULL, in_root("own"), &on);
+    train_ok(NULL, in_folder("own"), &on);
     assert_int_equal(chdir(here), 0);
-    assert_same_file(in_root("named/model.gbt"), in_root("own/model.gbt"));
+    assert_same_file(in_folder("named/model.gbt"), in_folder("own/model.gbt"));
 }
 
 static void other_data_are_refused(void **state)
@@ -177,7 +178,7 @@ static void other_data_are_refused(void **state)
     (void)state;
     gbt_train_def def = run_def(), on = resume_def(0, 0);
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("first"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    train_fails(tiny, in_folder("first"), &def, GBT_ERR_INTERRUPTED, "after step 5");
     /* As many photos and points, from other places. */
     gbt_make_scene_def scene_def = gbt_make_scene_def_default();
     scene_def.name = "terrain";
@@ -187,13 +188,13 @@ static void other_data_are_refused(void **state)
     scene_def.points = 150;
     scene_def.samples = 1;
     gbt_error err = {0};
-    assert_ok(gbt_make_scene(&scene_def, in_root("elsewhere"), &err));
-    train_fails(in_root("elsewhere"), in_root("first"), &on, GBT_ERR_FORMAT, "other data");
-    train_ok(tiny, in_root("first"), &on);
-    train_fails(tiny, in_root("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
-    assert_false(file_exists(in_root("no run")));
+    assert_ok(gbt_make_scene(&scene_def, in_folder("elsewhere"), &err));
+    train_fails(in_folder("elsewhere"), in_folder("first"), &on, GBT_ERR_FORMAT, "other data");
+    train_ok(tiny, in_folder("first"), &on);
+    train_fails(tiny, in_folder("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
+    assert_false(file_exists(in_folder("no run")));
     on.overwrite = true;
-    train_fails(tiny, in_root("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
+    train_fails(tiny, in_folder("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
 }
 
 /* Its colours are learned, are in the model, and have their moments in a checkpoint. */
@@ -202,14 +203,14 @@ static void a_learned_sky_goes_on(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.background = GBT_BACKGROUND_SKY;
-    train_ok(tiny, in_root("sky"), &def);
+    train_ok(tiny, in_folder("sky"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("sky_in_two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    train_fails(tiny, in_folder("sky_in_two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
     const gbt_train_def on = resume_def(STEPS, 0);
-    train_ok(tiny, in_root("sky_in_two"), &on);
-    assert_same_file(in_root("sky/model.gbt"), in_root("sky_in_two/model.gbt"));
+    train_ok(tiny, in_folder("sky_in_two"), &on);
+    assert_same_file(in_folder("sky/model.gbt"), in_folder("sky_in_two/model.gbt"));
     model m;
-    assert_ok(model_load(in_root("sky/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("sky/model.gbt"), &m, NULL));
     assert_true(m.sky.varies);
     double size = 0;
     for (int k = 0; k < 3; k++)
@@ -231,21 +232,21 @@ static void what_a_run_left_alone_stays(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("plain"), &def);
+    train_ok(tiny, in_folder("plain"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    train_fails(tiny, in_folder("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
     gbt_train_def on = resume_def(STEPS, 0);
     on.views = 4;
     on.background = GBT_BACKGROUND_SKY;
     on.refine_poses = true;
     char warnings[PATH_SIZE] = "";
     gbt_listen(keep_warnings, warnings);
-    train_ok(tiny, in_root("asked"), &on);
+    train_ok(tiny, in_folder("asked"), &on);
     be_quiet();
     assert_string_equal(warnings, "a run is resumed with its own settings: views = 1, not 4\n"
                                   "a run is resumed with its own settings: background = constant, not sky\n"
                                   "a run is resumed with its own settings: refine-poses = 0, not 1\n");
-    assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
+    assert_same_file(in_folder("plain/model.gbt"), in_folder("asked/model.gbt"));
 }
 
 /* What becomes of the list that was named, and where the run is gone on with, decides nothing. */
@@ -253,28 +254,28 @@ static void a_list_of_held_out_photos_is_the_runs_own(void **state)
 {
     (void)state;
     char split[PATH_SIZE], wanted[PATH_SIZE];
-    snprintf(split, sizeof split, "validate=3,list=%s", in_root("held.txt"));
-    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_root("list/held-out.txt"));
-    write_text(in_root("held.txt"), "0001.png\r\n\n0004.png");
+    snprintf(split, sizeof split, "validate=3,list=%s", in_folder("held.txt"));
+    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_folder("list/held-out.txt"));
+    write_text(in_folder("held.txt"), "0001.png\r\n\n0004.png");
     gbt_train_def def = run_def();
     def.eval_split = split;
-    train_ok(tiny, in_root("list straight"), &def);
+    train_ok(tiny, in_folder("list straight"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
-    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
-    write_text(in_root("held.txt"), "0002.png\n");
+    train_fails(tiny, in_folder("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    assert_same_file(in_folder("held.txt"), in_folder("list/held-out.txt"));
+    write_text(in_folder("held.txt"), "0002.png\n");
     const gbt_train_def on = resume_def(0, 0);
-    train_ok(tiny, in_root("list"), &on);
-    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
-    file_bytes config = read_bytes(in_root("list/config"));
+    train_ok(tiny, in_folder("list"), &on);
+    assert_same_file(in_folder("list straight/model.gbt"), in_folder("list/model.gbt"));
+    file_bytes config = read_bytes(in_folder("list/config"));
     assert_non_null(strstr((const char *)config.data, wanted));
     mem_free(config.data);
     /* A run of an older version has none. */
-    assert_int_equal(remove(in_root("list/held-out.txt")), 0);
-    write_text(in_root("held.txt"), "0001.png\n0004.png\n");
-    train_ok(tiny, in_root("list"), &on);
-    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
-    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
+    assert_int_equal(remove(in_folder("list/held-out.txt")), 0);
+    write_text(in_folder("held.txt"), "0001.png\n0004.png\n");
+    train_ok(tiny, in_folder("list"), &on);
+    assert_same_file(in_folder("held.txt"), in_folder("list/held-out.txt"));
+    assert_same_file(in_folder("list straight/model.gbt"), in_folder("list/model.gbt"));
 }
 
 /* However the new run ends: here, before its first checkpoint. */
@@ -295,24 +296,24 @@ static void an_overwritten_run_is_gone(void **state)
     enum { OLD = sizeof old / sizeof *old };
     gbt_train_def def = run_def(), on = resume_def(0, 0);
     def.refine_poses = true;
-    train_ok(tiny, in_root("lost"), &def);
-    assert_ok(file_make_folder(in_root("lost/renders/test"), NULL));
+    train_ok(tiny, in_folder("lost"), &def);
+    assert_ok(file_make_folder(in_folder("lost/renders/test"), NULL));
     for (int i = 0; i < OLD; i++)
-        if (!file_exists(in_root("lost/%s", old[i])))
-            write_text(in_root("lost/%s", old[i]), "old");
-    write_text(in_root("lost/notes.txt"), "old");
+        if (!file_exists(in_folder("lost/%s", old[i])))
+            write_text(in_folder("lost/%s", old[i]), "old");
+    write_text(in_folder("lost/notes.txt"), "old");
     def = run_def();
     def.overwrite = true;
-    train_fails(in_root("no data"), in_root("lost"), &def, GBT_ERR_IO, "no data");
+    train_fails(in_folder("no data"), in_folder("lost"), &def, GBT_ERR_IO, "no data");
     for (int i = 0; i < OLD; i++)
-        assert_true(file_exists(in_root("lost/%s", old[i])));
-    assert_int_equal(remove(in_root("lost/log.csv")), 0); /* cannot be written where a folder is */
-    assert_ok(file_make_folder(in_root("lost/log.csv"), NULL));
-    train_fails(tiny, in_root("lost"), &def, GBT_ERR_IO, "log.csv");
+        assert_true(file_exists(in_folder("lost/%s", old[i])));
+    assert_int_equal(remove(in_folder("lost/log.csv")), 0); /* cannot be written where a folder is */
+    assert_ok(file_make_folder(in_folder("lost/log.csv"), NULL));
+    train_fails(tiny, in_folder("lost"), &def, GBT_ERR_IO, "log.csv");
     for (int i = 0; i < OLD; i++)
-        assert_false(file_exists(in_root("lost/%s", old[i])));
-    assert_true(file_exists(in_root("lost/notes.txt")));
-    train_fails(tiny, in_root("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+        assert_false(file_exists(in_folder("lost/%s", old[i])));
+    assert_true(file_exists(in_folder("lost/notes.txt")));
+    train_fails(tiny, in_folder("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
 }
 
 int main(void)

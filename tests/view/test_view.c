@@ -101,7 +101,7 @@ static int train_once(void **state)
     gbt_train_def def = run_def();
     if (make_root(state) != 0)
         return -1;
-    run_folder = strdup(in_root("run"));
+    run_folder = strdup(in_folder("run"));
     train_ok(tiny, run_folder, &def);
     return 0;
 }
@@ -139,11 +139,11 @@ static void views_are_what_render_draws(void **state)
     assert_true(json_is_true(json_object_get(first, "test")));
     assert_true(number_of(first, "width") == 48 && number_of(first, "height") == 36 &&
                 number_of(there, "anchors") > 0);
-    assert_ok(gbt_render(run_folder, in_root("drawn"), &def, NULL));
+    assert_ok(gbt_render(run_folder, in_folder("drawn"), &def, NULL));
     snprintf(file, sizeof file, "drawn/%s", json_string_value(json_object_get(first, "name")));
     for (int i = 0; i < 2; i++) { /* drawn, and kept from before */
         reply r = get_ok(port, "/render?view=0");
-        assert_same_pixels(&r, in_root("%s", file));
+        assert_same_pixels(&r, in_folder("%s", file));
         free(r.text);
     }
     snprintf(path, sizeof path, "%s/images/%s", tiny, json_string_value(json_object_get(first, "name")));
@@ -170,12 +170,12 @@ static void cameras_are_what_render_draws(void **state)
             "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}",
             lenses[i]);
         gbt_render_def def = gbt_render_def_default();
-        def.camera = in_root("lens.json");
+        def.camera = in_folder("lens.json");
         assert_ok(file_write_atomic(def.camera, text, (size_t)length, NULL));
-        assert_ok(gbt_render(run_folder, in_root("drawn"), &def, NULL));
+        assert_ok(gbt_render(run_folder, in_folder("drawn"), &def, NULL));
         snprintf(path, sizeof path, "/render?camera=%s", text);
         reply r = get_ok(port, path);
-        assert_same_pixels(&r, in_root("drawn/lens.png"));
+        assert_same_pixels(&r, in_folder("drawn/lens.png"));
         free(r.text);
     }
     close_viewer(&v, SIGTERM);
@@ -389,17 +389,17 @@ static void wait_for_version(int port, int version)
 static void newer_models_are_shown(void **state)
 {
     (void)state;
-    char model[PATH_SIZE + 16], *live = strdup(in_root("live"));
+    char model[PATH_SIZE + 16], *live = strdup(in_folder("live"));
     gbt_train_def def = run_def();
     viewer v;
     snprintf(model, sizeof model, "%s/model.gbt", live);
-    copy_file(in_root("run/config"), in_root("live/config"));
+    copy_file(in_folder("run/config"), in_folder("live/config"));
     const int port = open_viewer(&v, live);
     reply none = http_get(port, "/scene");
     assert_int_equal(none.code, 503);
     assert_non_null(strstr(none.body, "has not saved a model yet"));
     free(none.text);
-    copy_file(in_root("run/model.gbt"), model);
+    copy_file(in_folder("run/model.gbt"), model);
     wait_for_version(port, 1);
     reply before = get_ok(port, "/render?view=0");
     assert_ok(file_write_atomic(model, "damaged", 7, NULL)); /* said, and the old one stays */
@@ -415,8 +415,8 @@ static void newer_models_are_shown(void **state)
     reply same = get_ok(port, "/render?view=0");
     assert_true(mean_difference(&before, &same) == 0);
     def.iterations = 20;
-    train_ok(tiny, in_root("other"), &def);
-    copy_file(in_root("other/model.gbt"), model);
+    train_ok(tiny, in_folder("other"), &def);
+    copy_file(in_folder("other/model.gbt"), model);
     wait_for_version(port, 2);
     reply after = get_ok(port, "/render?view=0");
     assert_true(mean_difference(&before, &after) > 0.5);
@@ -435,12 +435,12 @@ static void newer_models_are_shown(void **state)
 static void a_result_folder_is_shown(void **state)
 {
     (void)state;
-    const char *folder = in_root("result/");
+    const char *folder = in_folder("result/");
     gbt_export_def baked = gbt_export_def_default();
     baked.refine_steps = 0;
     assert_ok(gbt_export(run_folder, &baked, &folder, 1, NULL, NULL));
     viewer v;
-    const int port = open_viewer(&v, in_root("result"));
+    const int port = open_viewer(&v, in_folder("result"));
     json_t *there = get_json(port, "/scene");
     assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0);
     assert_true(json_array_size(json_object_get(there, "views")) > 0);
@@ -454,7 +454,7 @@ static void plain_gaussians_are_shown(void **state)
     (void)state;
     static const char camera[] = "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,"
                                  "\"height\":30,\"fov_x_deg\":60}";
-    const char *ply = in_root("plain.ply");
+    const char *ply = in_folder("plain.ply");
     gbt_export_def baked = gbt_export_def_default();
     baked.refine_steps = 0;
     assert_ok(gbt_export(run_folder, &baked, &ply, 1, NULL, NULL));
@@ -466,13 +466,13 @@ static void plain_gaussians_are_shown(void **state)
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
     assert_string_equal(json_string_value(json_object_get(status, "note")), "");
     gbt_render_def def = gbt_render_def_default();
-    def.camera = in_root("plain.json");
+    def.camera = in_folder("plain.json");
     assert_ok(file_write_atomic(def.camera, camera, sizeof camera - 1, NULL));
-    assert_ok(gbt_render(ply, in_root("drawn"), &def, NULL));
+    assert_ok(gbt_render(ply, in_folder("drawn"), &def, NULL));
     char path[256];
     snprintf(path, sizeof path, "/render?camera=%s", camera);
     reply r = get_ok(port, path);
-    assert_same_pixels(&r, in_root("drawn/plain.png"));
+    assert_same_pixels(&r, in_folder("drawn/plain.png"));
     free(r.text);
     snprintf(path, sizeof path, "/render?format=float&output=anchor&camera=%s", camera);
     r = get_ok(port, path);
@@ -488,7 +488,7 @@ static void the_extent_of_many_gaussians(void **state)
 {
     (void)state;
     enum { COUNT = 100002 };
-    const char *ply = in_root("many.ply");
+    const char *ply = in_folder("many.ply");
     gaussian_cloud c;
     assert_ok(gaussian_cloud_alloc(&c, COUNT, NULL));
     c.count = 0;
@@ -531,8 +531,8 @@ static void what_cannot_be_shown(void **state)
         gbt_error err = {0};
         def.port = rows[i].port;
         def.host = rows[i].host;
-        def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
-        const gbt_status status = gbt_view(in_root("%s", rows[i].input), &def, &err);
+        def.data = rows[i].data != NULL ? in_folder("%s", rows[i].data) : NULL;
+        const gbt_status status = gbt_view(in_folder("%s", rows[i].input), &def, &err);
         if (status != rows[i].status || strstr(err.text, rows[i].says) == NULL)
             fail_msg("%s: wanted %d with \"%s\", got %d: %s", rows[i].input, (int)rows[i].status,
                      rows[i].says, (int)status, err.text);
@@ -547,7 +547,7 @@ static void a_model_without_its_photos(void **state)
     viewer v;
     snprintf(away, sizeof away, "%s.away", tiny);
     assert_int_equal(rename(tiny, away), 0);
-    const int port = open_viewer(&v, in_root("run/model.gbt"));
+    const int port = open_viewer(&v, in_folder("run/model.gbt"));
     assert_int_equal(rename(away, tiny), 0);
     json_t *there = get_json(port, "/scene"), *status = get_json(port, "/status");
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);

@@ -395,48 +395,6 @@ static void glb_is_what_gltf_wants(void **state)
     gaussian_cloud_free(&a);
 }
 
-/* Every truncation and flip of the zipped bytes, then of what was zipped. */
-static void damaged_files(void **state)
-{
-    (void)state;
-    gaussian_attempts spz = {.read = gaussian_format_spz.read}, splat = {.read = gaussian_format_splat.read},
-                      glb = {.read = gaussian_format_glb.read};
-    gaussian_cloud a;
-    make_cloud(&a, 2, 1);
-    assert_ok(gaussian_file_write(in_folder("a.spz"), &a, nowhere, &assert_ok_err_));
-    assert_ok(gaussian_file_write(in_folder("a.splat"), &a, nowhere, &assert_ok_err_));
-    assert_ok(gaussian_file_write(in_folder("a.glb"), &a, nowhere, &assert_ok_err_));
-    gaussian_cloud_free(&a);
-    unsigned char *bytes, plain[256];
-    size_t size;
-    assert_ok(file_read(in_folder("a.spz"), &bytes, &size, &assert_ok_err_));
-    mutate_all(bytes, size, try_gaussians, &spz);
-    mem_free(bytes);
-    gzFile zipped = gzopen(in_folder("a.spz"), "rb");
-    const int plain_size = gzread(zipped, plain, sizeof plain);
-    gzclose(zipped);
-    for (int at = 0; at < plain_size; at++)
-        for (int flip = 1; flip < 256; flip = 2 * flip + 1) {
-            unsigned char changed[256], packed[512];
-            memcpy(changed, plain, sizeof changed);
-            changed[at] = (unsigned char)(changed[at] ^ flip);
-            z_stream z = {.next_in = changed,
-                          .avail_in = (uInt)plain_size,
-                          .next_out = packed,
-                          .avail_out = sizeof packed};
-            assert_int_equal(deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY), Z_OK);
-            assert_int_equal(deflate(&z, Z_FINISH), Z_STREAM_END);
-            try_gaussians(packed, z.total_out, &spz);
-            deflateEnd(&z);
-        }
-    assert_ok(file_read(in_folder("a.splat"), &bytes, &size, &assert_ok_err_));
-    mutate_all(bytes, size, try_gaussians, &splat);
-    mem_free(bytes);
-    assert_ok(file_read(in_folder("a.glb"), &bytes, &size, &assert_ok_err_));
-    mutate_all(bytes, size, try_gaussians, &glb);
-    mem_free(bytes);
-}
-
 static void refusals(void **state)
 {
     (void)state;
@@ -475,7 +433,6 @@ int main(void)
         cmocka_unit_test_setup_teardown(glb_that_is_wrong, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(glb_nodes_of_others, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(glb_is_what_gltf_wants, folder_make, folder_remove),
-        cmocka_unit_test_setup_teardown(damaged_files, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(refusals, folder_make, folder_remove),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -373,26 +373,6 @@ static void older_compressed_ply(void **state)
     gaussian_cloud_free(&c);
 }
 
-/* Every truncation and mutation. */
-static void damaged_files(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"a.compressed.ply", "a.v4.spz"};
-    static const gaussian_format *const formats[] = {&gaussian_format_compressed_ply, &gaussian_format_spz4};
-    for (size_t f = 0; f < sizeof formats / sizeof *formats; f++) {
-        gaussian_attempts attempts = {.read = formats[f]->read};
-        gaussian_cloud a;
-        make_cloud(&a, 2, 1);
-        assert_ok(gaussian_file_write(in_folder("%s", names[f]), &a, nowhere, &assert_ok_err_));
-        gaussian_cloud_free(&a);
-        unsigned char *bytes;
-        size_t size;
-        assert_ok(file_read(in_folder("%s", names[f]), &bytes, &size, &assert_ok_err_));
-        mutate_all(bytes, size, try_gaussians, &attempts);
-        mem_free(bytes);
-    }
-}
-
 /* A .usda with one Gaussian as another program may write it. */
 static const char usda[] =
     "#usda 1.0\n(\n    \"\"\"Made { by = hand\"\"\"\n    upAxis = \"Y\"\n)\n# def "
@@ -493,39 +473,6 @@ static void usdz_is_aligned(void **state)
     mem_free(bytes);
 }
 
-/* Larger files: every so many bytes. */
-static void check_damage(const char *path, const gaussian_format *format, size_t step)
-{
-    gaussian_attempts attempts = {.read = format->read};
-    unsigned char *bytes;
-    size_t size;
-    assert_ok(file_read(path, &bytes, &size, &assert_ok_err_));
-    for (size_t at = 0; at < size; at += step) {
-        unsigned char *copy = exact_copy(bytes, at);
-        try_gaussians(copy, at, &attempts);
-        free(copy);
-        copy = exact_copy(bytes, size);
-        copy[at] ^= 0x81;
-        try_gaussians(copy, size, &attempts);
-        free(copy);
-    }
-    mem_free(bytes);
-}
-
-static void damaged_bundles(void **state)
-{
-    (void)state;
-    gaussian_cloud a;
-    make_cloud(&a, 2, 1);
-    assert_ok(gaussian_file_write(in_folder("a.sog"), &a, nowhere, &assert_ok_err_));
-    assert_ok(gaussian_file_write(in_folder("a.usda"), &a, nowhere, &assert_ok_err_));
-    assert_ok(gaussian_file_write(in_folder("a.usdz"), &a, nowhere, &assert_ok_err_));
-    gaussian_cloud_free(&a);
-    check_damage(in_folder("a.sog"), &gaussian_format_sog, 13);
-    check_damage(in_folder("a.usda"), &gaussian_format_usda, 5);
-    check_damage(in_folder("a.usdz"), &gaussian_format_usdz, 13);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -544,8 +491,6 @@ int main(void)
         cmocka_unit_test(usda_that_is_wrong),
         cmocka_unit_test(levels_follow_the_values),
         cmocka_unit_test(palette_entries_are_means),
-        cmocka_unit_test_setup_teardown(damaged_files, folder_make, folder_remove),
-        cmocka_unit_test_setup_teardown(damaged_bundles, folder_make, folder_remove),
         cmocka_unit_test(older_compressed_ply),
         cmocka_unit_test(far_ones_are_apart),
     };

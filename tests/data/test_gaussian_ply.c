@@ -215,30 +215,6 @@ static void other_files(void **state)
     refused(&s, "1000000000 Gaussians cannot be");
 }
 
-static void mutations(void **state)
-{
-    (void)state;
-    sink s = {0};
-    put_header(&s, 1, 0, NULL);
-    put_row(&s, "1 -2.5 3", 0, "0.5", "-1 -2 -3", "1 0.5 0 0");
-    gaussian_attempts ascii = {.read = gaussian_ply_read}, little_endian = {.read = gaussian_ply_read};
-    mutate_all(s.bytes, s.size, try_gaussians, &ascii);
-    assert_true(ascii.accepted > 0);
-    sink_free(&s);
-    /* The same in binary, one row of 17 floats. */
-    put_header(&s, 1, 0, NULL);
-    sink binary = {0};
-    sink_put_text(&binary, "ply\nformat binary_little_endian 1.0\n");
-    sink_put(&binary, s.bytes + strlen("ply\nformat ascii 1.0\n"),
-             s.size - strlen("ply\nformat ascii 1.0\n"));
-    for (int k = 0; k < 17; k++)
-        sink_put_f32(&binary, 0.25f * (float)(k - 8));
-    mutate_all(binary.bytes, binary.size, try_gaussians, &little_endian);
-    assert_true(little_endian.accepted > 0);
-    sink_free(&s);
-    sink_free(&binary);
-}
-
 /* A NumPy array of floats with `per_row` columns, or NULL; free with mem_free() on *owned. */
 static const float *load_array(const char *name, size_t count, size_t per_row, unsigned char **owned)
 {
@@ -327,13 +303,9 @@ int main(void)
         tests[i] =
             (struct CMUnitTest){.name = row_cases[i].name, .test_func = rows, .initial_state = &row_cases[i]};
     const struct CMUnitTest fixed[] = {
-        cmocka_unit_test(layout_of_each_degree),
-        cmocka_unit_test(missing_properties),
-        cmocka_unit_test(wrong_counts_of_rest),
-        cmocka_unit_test(other_files),
-        cmocka_unit_test(mutations),
-        cmocka_unit_test(real_models),
-        cmocka_unit_test(same_as_arrays),
+        cmocka_unit_test(layout_of_each_degree), cmocka_unit_test(missing_properties),
+        cmocka_unit_test(wrong_counts_of_rest),  cmocka_unit_test(other_files),
+        cmocka_unit_test(real_models),           cmocka_unit_test(same_as_arrays),
     };
     const int failures = cmocka_run_group_tests_name("gaussian ply, rows", tests, NULL, NULL);
     return failures + cmocka_run_group_tests_name("gaussian ply", fixed, NULL, NULL);

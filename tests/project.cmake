@@ -5,13 +5,9 @@ add_test(NAME tools COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test
 add_test(NAME figures COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_figures.sh ${CMAKE_SOURCE_DIR})
 add_test(NAME names COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_names.sh ${CMAKE_SOURCE_DIR} $<TARGET_FILE:gbtrace>)
 add_test(NAME circles COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/test_circles.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR} ${CMAKE_C_COMPILER})
-add_test(NAME lines COMMAND ${SH_PROGRAM} -c "! grep -rnE '^.{111}' --include=*.[ch] --include=*.cpp src lab include examples scenes" WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-# The library names fields; dashes are the program's. A page of a run (report) has style sheets, and the command that made it.
-add_test(NAME messages COMMAND ${SH_PROGRAM} -c "! grep -rnE '\"([^\"]*[^-\"a-z])?--[a-z]' --include=*.c --include=*.h --include=*.cpp --exclude-dir=cli --exclude-dir=report src"
-  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-# Functions of the C library whose last bits differ between x86-64 and ARM, or between its versions (docs/reliability.md).
-add_test(NAME functions COMMAND ${SH_PROGRAM} -c "! grep -rnE '(^|[^a-z_0-9])(hypot|cbrtf?|exp2f?|exp10f?|a?(sin|cos|tan)hf|a(sin|cos|tan|tan2)f|tanf|erfc?f?|[lt]gammaf?)\\(' --include=*.c --include=*.h src lab scenes"
-  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+foreach(rule lines messages functions)
+  add_test(NAME ${rule} COMMAND ${SH_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/project/check_text.sh ${rule} ${CMAKE_SOURCE_DIR})
+endforeach()
 find_program(PYTHON_PROGRAM python3)
 if(PYTHON_PROGRAM)
   add_test(NAME mutants COMMAND ${PYTHON_PROGRAM} ${CMAKE_SOURCE_DIR}/tests/mutate/mutate.py --check)

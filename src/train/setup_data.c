@@ -189,6 +189,17 @@ static gbt_status choose_exposure(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+double setup_photo_steps(const trainer *t)
+{
+    double sum = 0;
+    for (size_t i = 0; i < t->train_count; i++) {
+        const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
+        const int parts = step_size_of(&c, &t->rules, 1).parts;
+        sum += (double)parts * parts;
+    }
+    return sum;
+}
+
 gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
@@ -223,11 +234,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
         t->scene.views[i].seen = NULL;
         t->scene.views[i].seen_count = 0;
     }
-    for (size_t i = 0; i < t->train_count; i++) {
-        const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
-        const int parts = step_size_of(&c, &t->rules, 1).parts;
-        t->photo_steps += (double)parts * parts;
-    }
+    t->photo_steps = setup_photo_steps(t);
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;

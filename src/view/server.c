@@ -103,10 +103,10 @@ server_job *server_next(server *s, double seconds)
 
 const atomic_bool *server_nobody_waits(const server *s) { return &s->nobody_waits; }
 
-void server_set_request_seconds(server *s, double seconds)
+void server_set_patience(server *s, double seconds)
 {
     pthread_mutex_lock(&s->lock);
-    s->clients.request_seconds = seconds;
+    s->clients.request_seconds = s->clients.answer_seconds = seconds;
     pthread_mutex_unlock(&s->lock);
 }
 

@@ -56,8 +56,8 @@ const request *server_request(const server_job *job);
    to stop: what is made for it may stop. */
 const atomic_bool *server_nobody_waits(const server *s);
 
-/** In place of SERVER_REQUEST_SECONDS, from the next connection on. For tests. */
-void server_set_request_seconds(server *s, double seconds);
+/** In place of SERVER_REQUEST_SECONDS and SERVER_ANSWER_SECONDS, for what begins from now on. For tests. */
+void server_set_patience(server *s, double seconds);
 
 /** Send; the answer's bytes are taken over. */
 void server_answer(server *s, server_job *job, const answer *with);

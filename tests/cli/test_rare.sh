@@ -110,6 +110,16 @@ report $? "a result folder of photos at half size" "$(cat err out)"
     grep -q 'resolution=24, ' narrow/cfg_args && grep -q '"width": 24,' narrow/cameras.json && "$program" render narrow -o narrow-drawn >>out 2>>err &&
     "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png --json | grep -q '"width": 24, "height": 18, "psnr": 100,'
 report $? "a result folder of photos at another width" "$(cat err out; cat narrow/cfg_args; "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png)"
+echo 0002.png >held-third
+"$program" train made -o third --iterations 3 --eval-split list=held-third --quiet >out 2>err && "$program" export third of-third/ --refine 0 >>out 2>>err &&
+    grep -m 1 '"img_name"' of-third/cameras.json | grep -q '"0002"' && "$program" info made | grep -e '^  points ' -e '^  origin ' >points && [ "$(wc -l <points)" = 2 ] &&
+    "$program" info of-third/input.ply | grep -e '^  points ' -e '^  origin ' | cmp - points >>err
+report $? "a result folder holds the points, and the held-out photo first" "$(cat err out points of-third/cameras.json)"
+"$program" compare of-third/test/ours_3/gt/00000.png made/images/0002.png --json | grep -q '"psnr": 100,' &&
+    "$program" compare of-third/test/ours_3/renders/00000.png of-third/test/ours_3/gt/00000.png --json | sed 's/.*"psnr": \([0-9.]*\), "ssim": \([0-9.]*\),.*/\2\n\1/' >scores &&
+    sed -n 's/.*"00000.png": \([0-9.]*\).*/\1/p' of-third/per_view.json | paste - scores |
+    awk '{ near += $1 > 0 && $1 - $2 < 1e-6 && $2 - $1 < 1e-6 } END { exit !(NR == 2 && near == 2) }'
+report $? "the scores in a result folder are those of its pictures" "$(cat scores of-third/per_view.json)"
 "$program" export run plain.ply >out 2>err && "$program" make-scene tabletop -o wide --width 1920 --height 12 --views 3 --points 20 --samples 1 --quiet >>out 2>>err && "$program" render plain.ply -o usual --data wide >>out 2>>err &&
     "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
     grep -q '1600 x 10' err && grep -q '1920 x 12' err

@@ -137,6 +137,14 @@ for file in $(find . -name '*.exr'); do # they hold the time when they were writ
 done
 find . -type f ! -name '*.json' ! -name '*.obj' | LC_ALL=C sort | xargs sha256sum | sed 's/ [ *]\.\// /' >"$work.now"
 platform="# $(getconf GNU_LIBC_VERSION), $("$program" doctor 2>/dev/null | sed -n 's/.*\(OpenImageIO [0-9.]*\).*/\1/p')"
+case $platform in
+*OpenImageIO\ [0-9]*) ;;
+*) # not a reason to skip
+    rm "$work.now"
+    report 1 "the version of OpenImageIO" "gbtrace doctor does not say it: $platform"
+    finish
+    ;;
+esac
 if [ "$record" = - ]; then
     printf '%s\n' "$platform"
     cat "$work.now"

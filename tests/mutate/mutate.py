@@ -4,8 +4,8 @@
 """usage: mutate.py [--count N] [--seed S] [--begin K] [--chosen] [--check] [--tree DIR] [FILE...]
 
 Each mutant is one change of one line, in a copy of the tree under build/mutate: another comparison or arithmetic operator, another constant,
-a condition turned round, a statement left out. The tests of the file's room are built and run with it, the quickest first: a failed build of the
-tests, a failed test or one that takes much longer than before kills it; where the pictures' bits depend on a room, golden_avx2 comes last.
+a condition turned round, a statement left out. The tests of the file's room are built and run with it, the quickest first: a failed test, or one
+that takes much longer than before, kills it; where the pictures' bits depend on a room, golden_avx2 comes last.
 --count draws so many at random from the files (default 20 from all of src/), those that do not compile not counted, from the K-th on; --chosen takes those of
 chosen.txt, with the tests that are named there; --check only sees whether each of them can still be made; --tree puts the copy elsewhere. Prints one line for each, and totals; exit code 1 when one survives.
 """

@@ -42,7 +42,7 @@ if verb == "feature_extractor":
         "CREATE TABLE IF NOT EXISTS two_view_geometries(pair_id INTEGER PRIMARY KEY, rows INTEGER);")
     names = open(given["--image_list_path"]).read().splitlines()
     for i, name in enumerate(names):
-        base.execute("INSERT OR IGNORE INTO images(name, camera_id) VALUES (?, 1)", (name,))
+        base.execute("INSERT OR IGNORE INTO images(name, camera_id, prior_tx) VALUES (?, 1, ?)", (name, 7.5 if what == "positions" else None))
         base.execute("INSERT OR REPLACE INTO keypoints VALUES ((SELECT image_id FROM images WHERE name = ?), 500)", (name,))
         print("Processed file [%d/%d]" % (i + 1, len(names)))
     base.commit()

@@ -176,6 +176,41 @@ says "features once more" 0 '5 of 8 photos registered' pose both -o two
 grep -q 'existing_camera_id 1' tools/arguments
 report $? "with the camera that they had" "$(cat tools/arguments)"
 
+# ---- what colmap is asked for
+rm -f tools/arguments
+says "five photos of one camera" 0 "^one: 5 of 5 photos registered" pose "my photos" -o one
+grep -q '^feature_extractor .*--ImageReader.camera_model SIMPLE_RADIAL --ImageReader.single_camera 1 ' tools/arguments
+report $? "share a camera of few parameters" "$(cat tools/arguments)"
+mkdir twenty && for i in $(seq -w 0 19); do cp five/images/0000.png twenty/00$i.png; done
+rm -f tools/arguments
+says "twenty photos of one camera" 0 "^one_of_twenty: 5 of 20 photos registered" pose twenty -o one_of_twenty
+grep -q '^feature_extractor .*--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 ' tools/arguments
+report $? "share one of all parameters" "$(cat tools/arguments)"
+rm -f tools/arguments
+says "photos near each other, without positions" 3 "^error: .*my photos: no photo has a position from GPS in its EXIF" pose "my photos" -o nowhere --matcher spatial
+export FALSE_COLMAP=positions
+says "with positions" 0 "^near: 5 of 5 photos registered" pose "my photos" -o near --matcher spatial
+[ "$(grep -c '^spatial_matcher ' tools/arguments)" = 1 ]
+report $? "are matched by them" "$(cat tools/arguments)"
+
+# ---- photos of one size, of two focal lengths
+mkdir lenses && python3 - "$here/../fuzz/seeds/photo/turned" <<'END'
+import struct, sys
+seed = open(sys.argv[1], "rb").read() # a JPEG of 8 x 8 pixels; here 64 x 64, each block of them the same 6 bits
+size = seed.index(b"\xff\xc0") + 5
+head = seed[seed.index(b"\xff\xdb"):size] + struct.pack(">HH", 64, 64) + seed[size + 4:]
+scan = head.index(b"\xff\xda") + 2
+head = head[:scan + struct.unpack(">H", head[scan:scan + 2])[0]]
+for i, focal in enumerate([24, 35, 24]):
+    exif = b"Exif\0\0MM\0*" + struct.pack(">IHHHIII", 8, 1, 0x8769, 4, 1, 26, 0) + struct.pack(">HHHIIIII", 1, 0x920a, 5, 1, 44, 0, focal, 1)
+    open("lenses/%d.jpg" % i, "wb").write(b"\xff\xd8\xff\xe1" + struct.pack(">H", 2 + len(exif)) + exif + head + b"\x28\xa2\x8a" * 16 + b"\xff\xd9")
+END
+export FALSE_COLMAP=mapper-fails
+says "two focal lengths" 4 "features: 3 photos, 2 cameras by size and EXIF" pose lenses -o lensed
+[ "$(cat lensed/colmap/camera_1.txt)" = "$(printf '0.jpg\n2.jpg')" ] && [ "$(cat lensed/colmap/camera_2.txt)" = 1.jpg ]
+report $? "and which photo has which" "$(cat lensed/colmap/camera_*.txt)"
+export FALSE_COLMAP=
+
 # ---- more cameras than eight, and options that an older colmap lacks
 mkdir many && python3 - <<'END'
 import struct, zlib

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# tests/project/test_tools.sh -- plants offences that tools/check_layers.sh and tools/count_tests.awk must see; what ./run and
+# tests/project/test_tools.sh -- plants offences that tools/check_layers.sh, check_text.sh and tools/count_tests.awk must see; what ./run and
 # .ci/run say of wrong arguments and missing tools. Usage: test_tools.sh SOURCE
 set -u
 source=$1
@@ -50,6 +50,25 @@ layers "a room without a row" src/odd/a.c 'int x;' "1 src/odd/a.c: room odd is n
 layers "a public header that shows a room" include/gbtrace/a.h '#include "base/a.h"' "1 include/gbtrace/a.h:1: include may not include base/a.h"
 layers "a row that names a row below" tools/layers.txt 'base: cli' "1 tools/layers.txt: base: cli does not stand above it
 src/bvh/embree_api.h: room bvh is not in tools/layers.txt"
+
+# text RULE LINE WANTED: a tree with that line.
+text() {
+    rm -rf "$work/tree"
+    mkdir -p "$work/tree/src/odd" "$work/tree/lab" "$work/tree/include" "$work/tree/examples" "$work/tree/scenes"
+    printf '%s\n' "$2" >"$work/tree/src/odd/a.c"
+    got=$(sh "$source/tests/project/check_text.sh" "$1" "$work/tree")
+    check "text: $1: $2" "$3" "$? $got"
+}
+wide=$(printf '%0111d' 0)
+text lines "$wide" "1 src/odd/a.c:1:$wide"
+text lines "${wide#0}" "0 "
+text messages 'fail("use --steps");' '1 src/odd/a.c:1:fail("use --steps");'
+text messages 'fail("steps -- or none");' "0 "
+text functions 'x = tanf(y);' "1 src/odd/a.c:1:x = tanf(y);"
+text functions 'x = own_tanf(y);' "0 "
+rmdir "$work/tree/scenes"
+sh "$source/tests/project/check_text.sh" functions "$work/tree" 2>"$work/said"
+check "text: without a folder that it looks at" "1 1" "$? $(wc -l <"$work/said")"
 
 # count NAME CTEST_CODE STATUS WANTED: the output of one program comes on stdin; STATUS is what ctest says of it.
 count() {

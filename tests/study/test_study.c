@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/study/test_study.c -- lists of kernels, passes in turn, and a chart whose words cover nothing. */
+/* tests/study/test_study.c -- lists of kernels, passes in turn, rows of gradients, and a chart whose words
+   cover nothing. */
 #include "base/memory.h"
 #include "base/near.h"
 #include "benchmark/bench_passes.h"
 #include "benchmark/bench_reference.h"
+#include "benchmark/check_grad.h"
 #include "study/chart.h"
 #include "trace/random_scene.h"
 
@@ -106,6 +108,22 @@ static size_t count_of(const char *svg, const char *part)
     return count;
 }
 
+static void gradients_beyond_their_limits(void **state)
+{
+    (void)state;
+    static grad_checker c;
+    char *rows = NULL;
+    size_t size;
+    c.out = open_memstream(&rows, &size);
+    grad_print_row(&c, "tracer", "mean", 0.5e-4, 1e-4);
+    grad_print_row(&c, "tracer", "scale", 2e-4, 1e-4);
+    grad_print_row(&c, "tracer", "opacity", (double)NAN, 1e-4);
+    fclose(c.out);
+    assert_int_equal(c.broken, 2);
+    assert_int_equal(count_of(rows, "  broken\n"), 2);
+    free(rows);
+}
+
 static void chart_of_nothing(void **state)
 {
     (void)state;
@@ -171,7 +189,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lists_of_kernels),    cmocka_unit_test(ways_in_turn),
         cmocka_unit_test(chart_of_nothing),    cmocka_unit_test(one_point_is_a_chart),
-        cmocka_unit_test(words_cover_nothing),
+        cmocka_unit_test(words_cover_nothing), cmocka_unit_test(gradients_beyond_their_limits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

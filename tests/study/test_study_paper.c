@@ -5,6 +5,7 @@
 
 #include "base/near.h"
 #include "data/json_fields.h"
+#include "eval/lpips.h"
 #include "eval/lpips_network.h"
 #include "study/paper.h"
 #include "study/anchors.h"
@@ -682,18 +683,26 @@ static void what_a_scene_needs(void **state)
 
 /* ---- photos that are masked whole, scores of half of each photo ---- */
 
-/* The tiny scene with two held-out photos, of which the first is masked whole; `second`: the name of the
+enum { BLACK_WIDTH = 64, BLACK_HEIGHT = 36 }; /* AlexNet wants 31 pixels, of a half, too */
+
+/* A tiny scene with two held-out photos, of which the first is masked whole; `second`: the name of the
  * other. */
 static void make_half_black_scene(const char *folder, char second[64])
 {
-    make_tiny_scene(folder);
+    gbt_make_scene_def def = gbt_make_scene_def_default();
+    def.width = BLACK_WIDTH;
+    def.height = BLACK_HEIGHT;
+    def.view_count = VIEWS;
+    def.points = 150;
+    def.samples = 4;
+    assert_ok(gbt_make_scene(&def, folder, &assert_ok_err_));
     assert_ok(file_make_folder(in_folder("black/masks"), NULL));
     scene s;
     assert_ok(scene_load(folder, NULL, &s, NULL));
     assert_true(s.views[0].is_test && s.views[8].is_test);
     image black;
-    assert_ok(image_alloc(&black, 48, 36, 1, NULL));
-    memset(black.pixels, 0, 48 * 36 * sizeof *black.pixels);
+    assert_ok(image_alloc(&black, BLACK_WIDTH, BLACK_HEIGHT, 1, NULL));
+    memset(black.pixels, 0, BLACK_WIDTH * BLACK_HEIGHT * sizeof *black.pixels);
     assert_ok(image_write(in_folder("black/masks/%s.png", s.views[0].name), &black, NULL));
     snprintf(second, 64, "%s,", s.views[8].name);
     image_free(&black);
@@ -729,6 +738,48 @@ static void check_photo_psnr(const char *run)
     assert_string_equal(json_string_value(json_object_get(row, "value")), "default");
     assert_near(json_number_value(json_object_get(row, "photo_psnr")), metric_of(run, "psnr"), 0.01);
     json_decref(model);
+}
+
+/* Of the last held-out view of the run of halves, from now on with a mask that is black in its right quarter:
+   that of its right half alone, and of the pictures that eval has saved of that. */
+static void check_lpips_of_a_half(const gbt_evaluate_def *with_network)
+{
+    image mask, render, photo, halves[2];
+    lpips *net;
+    lpips_scores wanted;
+    json_t *metrics;
+    assert_ok(image_alloc(&mask, BLACK_WIDTH, BLACK_HEIGHT, 1, NULL));
+    for (int i = 0; i < BLACK_WIDTH * BLACK_HEIGHT; i++)
+        mask.pixels[i] = i % BLACK_WIDTH < BLACK_WIDTH * 3 / 4;
+    assert_ok(image_write(in_folder("black/masks/0008.png.png"), &mask, NULL));
+    assert_ok(gbt_evaluate(in_folder("halves-run"), with_network, &assert_ok_err_));
+    assert_ok(image_read(in_folder("halves-run/renders/test/0008.png"), &render, &assert_ok_err_));
+    assert_ok(image_read(in_folder("halves-run/renders/test/0008.photo.png"), &photo, &assert_ok_err_));
+    assert_true(render.channels == 3 && photo.channels == 3 && render.width == BLACK_WIDTH);
+    for (int i = 0; i < 2; i++) {
+        assert_ok(image_alloc(&halves[i], BLACK_WIDTH / 2, BLACK_HEIGHT, 3, NULL));
+        for (int y = 0; y < BLACK_HEIGHT; y++)
+            for (int x = 0; x < BLACK_WIDTH / 2; x++) {
+                const image *from = i == 0 && x < BLACK_WIDTH / 4 ? &render : &photo;
+                memcpy(halves[i].pixels + 3 * (y * BLACK_WIDTH / 2 + x),
+                       from->pixels + 3 * (y * BLACK_WIDTH + BLACK_WIDTH / 2 + x), 3 * sizeof(float));
+            }
+    }
+    assert_ok(lpips_open(with_network->lpips, &net, NULL));
+    assert_ok(lpips_compare(net, &halves[0], &halves[1], NULL, 0, &wanted, NULL));
+    assert_ok(json_read(in_folder("halves-run/metrics.json"), &metrics, NULL));
+    const json_t *view = json_array_get(json_object_get(metrics, "views"), 1);
+    assert_true(wanted.lpips > 0);
+    assert_near(json_number_value(json_object_get(view, "lpips")), wanted.lpips, 1e-4 * wanted.lpips);
+    assert_near(json_number_value(json_object_get(view, "lpips_01")), wanted.lpips_01,
+                1e-4 * wanted.lpips_01);
+    json_decref(metrics);
+    lpips_close(net);
+    image_free(&mask);
+    image_free(&render);
+    image_free(&photo);
+    image_free(&halves[0]);
+    image_free(&halves[1]);
 }
 
 static void a_photo_masked_whole(void **state)
@@ -774,6 +825,7 @@ static void a_photo_masked_whole(void **state)
     if (strncmp(line, second, strlen(second)) != 0)
         fail_msg("%s", line);
     fclose(out);
+    check_lpips_of_a_half(&scores);
 }
 
 int main(void)

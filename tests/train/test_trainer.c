@@ -29,6 +29,7 @@
 #include "train/config.h"
 #include "train/save.h"
 #include "train/seed_points.h"
+#include "train/setup_data.h"
 #include "train/step_size.h"
 
 /* The run that others are compared with: STEPS steps in one go. */
@@ -1715,6 +1716,30 @@ static void every_part_has_its_turn(void **state)
     trainer_free(&t);
 }
 
+/* A photo of four parts has had a look when each of them had one; a step of four views is four looks. */
+static void steps_leave_out_by_looks(void **state)
+{
+    (void)state;
+    static const int views[] = {1, 4};
+    for (int i = 0; i < 2; i++) {
+        trainer t;
+        step_report report;
+        gbt_train_def def = run_def();
+        def.start_level = 0;
+        def.views = views[i];
+        def.iterations = 5600 / (uint64_t)views[i];
+        open_ok(&t, tiny, &def);
+        assert_true(t.photo_steps == (double)t.train_count);
+        t.rules.step_pixels = 48 * 36 / 4;
+        t.photo_steps = setup_photo_steps(&t);
+        step_ok(&t, &report);
+        const float wanted = schedule_left_out(5600 / (4.0 * (double)t.train_count));
+        assert_true(wanted > 0 && wanted != schedule_left_out(5600 / (double)t.train_count));
+        assert_true(t.left_out == wanted);
+        trainer_free(&t);
+    }
+}
+
 /* Of every second pixel in both directions, all four that may be the first come. */
 static void picked_pixels_begin_anywhere(void **state)
 {
@@ -2014,6 +2039,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(parts_make_up_the_photo),
         cmocka_unit_test(every_part_has_its_turn),
+        cmocka_unit_test(steps_leave_out_by_looks),
         cmocka_unit_test(picked_pixels_begin_anywhere),
         cmocka_unit_test(photos_keep_to_their_memory),
         cmocka_unit_test(steps_keep_to_their_pixels),

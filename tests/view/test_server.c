@@ -316,6 +316,17 @@ static void nobody_waits_for_an_answer_that_nobody_wants(void **state)
     assert_lives();
 }
 
+/* A byte now and then, until it is closed. */
+static void send_slowly(int fd)
+{
+    char byte;
+    while (recv(fd, &byte, 1, MSG_DONTWAIT) < 0) {
+        http_write(fd, "x", 1);
+        usleep(20000);
+    }
+    close(fd);
+}
+
 /* As many as one address may have, each with half a request: they are shut, and the server answers again. */
 static void slow_clients_are_shut(void **state)
 {
@@ -323,22 +334,42 @@ static void slow_clients_are_shut(void **state)
     server *other;
     int slow[SERVER_ADDRESS_CONNECTIONS];
     assert_ok(server_start(&here, 0, "", &other, NULL));
-    server_set_request_seconds(other, 0.2);
+    server_set_patience(other, 0.2);
     for (int i = 0; i < SERVER_ADDRESS_CONNECTIONS; i++) {
         slow[i] = http_connect(server_port(other));
         http_write(slow[i], "GET /status HTTP/1.1\r\nX: ", 26);
     }
-    for (int i = 0; i < SERVER_ADDRESS_CONNECTIONS; i++) {
-        char byte;
-        while (recv(slow[i], &byte, 1, MSG_DONTWAIT) < 0) { /* a byte now and then, until it is closed */
-            http_write(slow[i], "x", 1);
-            usleep(20000);
-        }
-        close(slow[i]);
-    }
+    for (int i = 0; i < SERVER_ADDRESS_CONNECTIONS; i++)
+        send_slowly(slow[i]);
+    server_set_patience(other, SERVER_REQUEST_SECONDS);
     reply r = http_get(server_port(other), "/status");
     assert_int_equal(r.code, 200);
     free(r.text);
+    server_stop(other);
+}
+
+/* More than the kernel holds, of which one byte is taken. Whoever came later and is shut, too, was shut after
+   it. */
+static void who_does_not_take_an_answer_is_shut(void **state)
+{
+    (void)state;
+    enum { BYTES = 1 << 26 };
+    server *other;
+    char byte;
+    assert_ok(server_start(&here, 0, "", &other, NULL));
+    const int fd = http_ask(server_port(other), "/scene");
+    server_job *job = wait_for_job(other);
+    server_set_patience(other, 0.2);
+    const answer large = {
+        .code = 200, .type = "text/plain", .bytes = mem_calloc(BYTES, 1, "test", NULL), .count = BYTES};
+    server_answer(other, job, &large);
+    assert_int_equal(recv(fd, &byte, 1, 0), 1);
+    const int later = http_connect(server_port(other));
+    http_write(later, "GET /status HTTP/1.1\r\nX: ", 26);
+    send_slowly(later);
+    reply rest = http_read(fd);
+    assert_true(rest.count < BYTES);
+    free(rest.text);
     server_stop(other);
 }
 
@@ -517,6 +548,7 @@ int main(void)
         cmocka_unit_test(a_body_without_end_is_cut),
         cmocka_unit_test(nobody_waits_for_an_answer_that_nobody_wants),
         cmocka_unit_test(slow_clients_are_shut),
+        cmocka_unit_test(who_does_not_take_an_answer_is_shut),
         cmocka_unit_test(one_address_leaves_room_for_others),
         cmocka_unit_test(it_is_known_that_nobody_waits),
         cmocka_unit_test(a_signal_ends_what_is_made),

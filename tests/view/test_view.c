@@ -14,6 +14,7 @@
 #include "gbtrace/evaluate.h"
 #include "gbtrace/export.h"
 #include "gbtrace/view.h"
+#include "view/studio.h"
 
 /* ---- the viewer in a thread of its own ---- */
 
@@ -219,6 +220,36 @@ static void times_are_part_of_the_wait(void **state)
     close_viewer(&v, SIGINT);
 }
 
+/* The next picture is whole, whatever was left of the one before. */
+static void a_picture_that_nobody_waits_for_is_given_up(void **state)
+{
+    (void)state;
+    static const gbt_renderer renderers[] = {GBT_RENDERER_TRACE, GBT_RENDERER_RASTER};
+    studio s;
+    atomic_bool stop;
+    gbt_render_def def = gbt_render_def_default();
+    assert_ok(studio_open(run_folder, NULL, &s, &assert_ok_err_));
+    s.stop = &stop;
+    for (size_t i = 0; i < sizeof renderers / sizeof *renderers; i++) {
+        const request what = {.kind = REQUEST_RENDER, .renderer = renderers[i], .preset = GBT_PRESET_DEFAULT};
+        answer none = {0}, whole = {0};
+        atomic_store(&stop, true);
+        studio_answer(&s, &what, &none);
+        assert_int_equal(none.code, 500);
+        assert_non_null(memmem(none.bytes, none.count, "stopped", 7));
+        atomic_store(&stop, false);
+        studio_answer(&s, &what, &whole);
+        assert_int_equal(whole.code, 200);
+        def.renderer = renderers[i];
+        assert_ok(gbt_render(run_folder, in_folder("whole"), &def, &assert_ok_err_));
+        const reply r = {.body = (char *)whole.bytes, .body_count = whole.count};
+        assert_same_pixels(&r, in_folder("whole/0000.png"));
+        mem_free(none.bytes);
+        mem_free(whole.bytes);
+    }
+    studio_close(&s);
+}
+
 static void samples_are_other_points_of_the_pixels(void **state)
 {
     (void)state;
@@ -389,20 +420,20 @@ static void wait_for_version(int port, int version)
 static void newer_models_are_shown(void **state)
 {
     (void)state;
-    char model[PATH_SIZE + 16], *live = strdup(in_folder("live"));
+    char saved[PATH_SIZE + 16], *live = strdup(in_folder("live"));
     gbt_train_def def = run_def();
     viewer v;
-    snprintf(model, sizeof model, "%s/model.gbt", live);
+    snprintf(saved, sizeof saved, "%s/model.gbt", live);
     copy_file(in_folder("run/config"), in_folder("live/config"));
     const int port = open_viewer(&v, live);
     reply none = http_get(port, "/scene");
     assert_int_equal(none.code, 503);
     assert_non_null(strstr(none.body, "has not saved a model yet"));
     free(none.text);
-    copy_file(in_folder("run/model.gbt"), model);
+    copy_file(in_folder("run/model.gbt"), saved);
     wait_for_version(port, 1);
     reply before = get_ok(port, "/render?view=0");
-    assert_ok(file_write_atomic(model, "damaged", 7, NULL)); /* said, and the old one stays */
+    assert_ok(file_write_atomic(saved, "damaged", 7, NULL)); /* said, and the old one stays */
     for (json_t *status = NULL; status == NULL;) {
         status = get_json(port, "/status");
         if (strstr(json_string_value(json_object_get(status, "note")), "model.gbt") == NULL) {
@@ -416,7 +447,7 @@ static void newer_models_are_shown(void **state)
     assert_true(mean_difference(&before, &same) == 0);
     def.iterations = 20;
     train_ok(tiny, in_folder("other"), &def);
-    copy_file(in_folder("other/model.gbt"), model);
+    copy_file(in_folder("other/model.gbt"), saved);
     wait_for_version(port, 2);
     reply after = get_ok(port, "/render?view=0");
     assert_true(mean_difference(&before, &after) > 0.5);
@@ -564,6 +595,7 @@ int main(void)
         cmocka_unit_test(views_are_what_render_draws),
         cmocka_unit_test(cameras_are_what_render_draws),
         cmocka_unit_test(times_are_part_of_the_wait),
+        cmocka_unit_test(a_picture_that_nobody_waits_for_is_given_up),
         cmocka_unit_test(samples_are_other_points_of_the_pixels),
         cmocka_unit_test(a_background_is_chosen),
         cmocka_unit_test(every_format_and_output),

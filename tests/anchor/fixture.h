@@ -3,12 +3,11 @@
 #ifndef GBT_TESTS_ANCHOR_FIXTURE_H
 #define GBT_TESTS_ANCHOR_FIXTURE_H
 
-#include "test_support.h"
+#include "gaussians_support.h"
 
 #include "anchor/decode.h"
 #include "base/hash.h"
 #include "base/memory.h"
-#include "base/rng.h"
 
 static inline float spread(uint64_t seed, uint64_t stream, uint64_t index, float low, float high)
 {
@@ -48,15 +47,6 @@ static inline uint32_t *every(size_t count, size_t step, size_t *visible_count)
     for (size_t i = 0; i < count; i += step)
         visible[(*visible_count)++] = (uint32_t)i;
     return visible;
-}
-
-/* The fields of a set of Gaussians in the order of base/gaussians.h. */
-static inline void field_list(const gaussians *g, float *fields[GAUSSIANS_FIELD_COUNT])
-{
-    int i = 0;
-#define X(name, pad, meaning) fields[i++] = g->name;
-    GAUSSIANS_FIELDS(X)
-#undef X
 }
 
 static inline uint64_t hash_gaussians(uint64_t hash, const gaussians *g)

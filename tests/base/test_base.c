@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/base/test_base.c -- what every room stands on: errors, memory, random numbers, files, Gaussian
    arrays, images, threads, vectors. */
-#include <dirent.h>
 #include <fcntl.h>
 #include <limits.h>
 #include <signal.h>
@@ -24,8 +23,8 @@
 #include "base/rng.h"
 #include "base/stop_signal.h"
 #include "base/vec.h"
+#include "folder.h"
 #include "gbtrace/progress.h"
-#include "test_support.h"
 
 /* A turn by 90 degrees about z: nothing that follows it in memory counts, and no column or row may be wrong.
  */
@@ -268,55 +267,10 @@ static void random_numbers_have_their_moments(void **state)
     assert_true(rng_uniform(1, 2, 5) != rng_uniform(1, 3, 5) && rng_uniform(1, 2, 5) != rng_uniform(2, 2, 5));
 }
 
-static char folder[256];
-
-static int make_folder(void **state)
-{
-    (void)state;
-    const char *root = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/gbt_base_XXXXXX", root != NULL ? root : "/tmp");
-    return mkdtemp(folder) == NULL;
-}
-
-static int entry_count(const char *path)
-{
-    int count = 0;
-    DIR *dir = opendir(path);
-    assert_non_null(dir);
-    for (const struct dirent *entry; (entry = readdir(dir)) != NULL;)
-        count += entry->d_name[0] != '.' || (entry->d_name[1] != '\0' && entry->d_name[1] != '.');
-    closedir(dir);
-    return count;
-}
-
-static void remove_entries(const char *path)
-{
-    DIR *dir = opendir(path);
-    if (dir == NULL)
-        return;
-    for (const struct dirent *entry; (entry = readdir(dir)) != NULL;) {
-        if (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0)
-            continue;
-        char child[1024];
-        snprintf(child, sizeof child, "%s/%s", path, entry->d_name);
-        remove_entries(child);
-        remove(child);
-    }
-    closedir(dir);
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    remove_entries(folder);
-    return rmdir(folder);
-}
-
 static void files_come_back(void **state)
 {
     (void)state;
-    char path[512];
-    assert_ok(file_join(path, sizeof path, folder, "a.bin", NULL));
+    const char *path = in_folder("a.bin");
     static const size_t sizes[] = {0, 1, 100000};
     for (size_t k = 0; k < 3; k++) {
         unsigned char *bytes = mem_alloc(sizes[k], 1, "test", NULL), *back;
@@ -331,8 +285,8 @@ static void files_come_back(void **state)
         mem_free(back);
         mem_free(bytes);
     }
-    assert_int_equal(entry_count(folder), 1); /* no temporary file */
-    assert_true(file_exists(path) && !file_is_folder(path) && file_is_folder(folder));
+    assert_int_equal(count_files(test_folder), 1); /* no temporary file */
+    assert_true(file_exists(path) && !file_is_folder(path) && file_is_folder(test_folder));
     remove(path);
     assert_false(file_exists(path));
 }
@@ -340,12 +294,10 @@ static void files_come_back(void **state)
 static void private_files_stay_private(void **state)
 {
     (void)state;
-    char path[512], name[512];
+    const char *path = in_folder("a.bin"), *name = in_folder("link");
     struct stat info;
     unsigned char *bytes;
     size_t count;
-    assert_ok(file_join(path, sizeof path, folder, "a.bin", NULL));
-    assert_ok(file_join(name, sizeof name, folder, "link", NULL));
     assert_ok(file_write_atomic(path, "old", 3, NULL));
     assert_int_equal(chmod(path, 0600), 0);
     assert_int_equal(symlink("a.bin", name), 0);
@@ -358,15 +310,13 @@ static void private_files_stay_private(void **state)
     assert_int_equal(count, 5);
     assert_memory_equal(bytes, "newer", 5);
     mem_free(bytes);
-    remove(path);
-    remove(name);
 }
 
 static void failed_writes_leave_nothing(void **state)
 {
     (void)state;
-    char path[512], inner[600];
-    assert_ok(file_join(path, sizeof path, folder, "is_a_folder", NULL));
+    char inner[600];
+    const char *path = in_folder("is_a_folder");
     assert_ok(file_make_folder(path, NULL));
     assert_ok(file_join(inner, sizeof inner, path, "keep", NULL));
     assert_ok(file_write_atomic(inner, "old", 3, NULL));
@@ -375,30 +325,29 @@ static void failed_writes_leave_nothing(void **state)
                                                                               there */
     assert_int_equal(err.status, GBT_ERR_IO);
     assert_ptr_equal(strstr(err.text, path), err.text);
-    assert_int_equal(entry_count(folder), 1);
-    assert_int_equal(entry_count(path), 1);
+    assert_int_equal(count_files(test_folder), 1);
+    assert_int_equal(count_files(path), 1);
     assert_int_equal(file_write_atomic("/nowhere/at/all", "x", 1, NULL), GBT_ERR_IO);
     char long_path[5000];
     memset(long_path, 'x', sizeof long_path);
     long_path[sizeof long_path - 1] = '\0';
     assert_int_equal(file_write_atomic(long_path, "x", 1, NULL), GBT_ERR_ARGUMENT);
-    remove_entries(folder);
 }
 
 /* What a write would say, before there is anything to write. */
 static void places_are_looked_at(void **state)
 {
     (void)state;
-    char path[512], inner[600];
+    char inner[600];
     gbt_error err = {0};
-    assert_ok(file_join(path, sizeof path, folder, "there", NULL));
+    const char *path = in_folder("there");
     assert_ok(file_check_creatable(path, NULL));
     assert_ok(file_check_folder_creatable(path, NULL));
     assert_ok(file_join(inner, sizeof inner, path, "a/", NULL));
     assert_ok(file_check_folder_creatable(inner, NULL));
     assert_int_equal(file_check_creatable(inner, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "there/a/: cannot create: No such file or directory"));
-    assert_int_equal(entry_count(folder), 0);
+    assert_int_equal(count_files(test_folder), 0);
     assert_ok(file_check_creatable("x", NULL)); /* here */
     assert_ok(file_check_folder_creatable("x/y", NULL));
     assert_ok(file_write_atomic(path, "x", 1, NULL));
@@ -407,24 +356,23 @@ static void places_are_looked_at(void **state)
     assert_int_equal(file_check_folder_creatable(inner, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "cannot create: Not a directory"));
     err = (gbt_error){0};
-    assert_int_equal(file_check_creatable(folder, &err), GBT_ERR_IO);
+    assert_int_equal(file_check_creatable(test_folder, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "cannot create: Is a directory"));
     if (geteuid() != 0) { /* who may write everywhere */
-        assert_int_equal(chmod(folder, 0555), 0);
+        assert_int_equal(chmod(test_folder, 0555), 0);
         assert_int_equal(file_check_creatable(path, NULL), GBT_ERR_IO);
-        assert_int_equal(chmod(folder, 0755), 0);
+        assert_int_equal(chmod(test_folder, 0755), 0);
     }
-    remove_entries(folder);
 }
 
 /* What is no file is written to, and stays what it is. */
 static void streams_are_not_replaced(void **state)
 {
     (void)state;
-    char path[512], got[8] = {0};
+    char got[8] = {0};
     struct stat info;
     large_file large;
-    assert_ok(file_join(path, sizeof path, folder, "pipe", NULL));
+    const char *path = in_folder("pipe");
     assert_int_equal(mkfifo(path, 0600), 0);
     const int reader = open(path, O_RDONLY | O_NONBLOCK);
     assert_true(reader >= 0 && file_is_stream(path) && file_is_stream("/dev/null"));
@@ -438,19 +386,18 @@ static void streams_are_not_replaced(void **state)
     close(reader);
     assert_int_equal(stat(path, &info), 0);
     assert_true(S_ISFIFO(info.st_mode));
-    assert_int_equal(entry_count(folder), 1);
+    assert_int_equal(count_files(test_folder), 1);
     assert_ok(file_check_creatable("/dev/null", NULL));
-    remove_entries(folder);
-    assert_false(file_is_stream(path) || file_is_stream(folder));
+    remove(path);
+    assert_false(file_is_stream(path) || file_is_stream(test_folder));
 }
 
 /* A write that stops half-way (here at a file size limit) leaves the old file whole and no temporary one. */
 static void full_disk_keeps_the_old_file(void **state)
 {
     (void)state;
-    char path[512];
     static const unsigned char big[100000];
-    assert_ok(file_join(path, sizeof path, folder, "model", NULL));
+    const char *path = in_folder("model");
     assert_ok(file_write_atomic(path, "old", 3, NULL));
     struct rlimit keep, tight;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &keep), 0);
@@ -470,8 +417,7 @@ static void full_disk_keeps_the_old_file(void **state)
     assert_int_equal(count, 3);
     assert_memory_equal(bytes, "old", 3);
     mem_free(bytes);
-    assert_int_equal(entry_count(folder), 1);
-    remove_entries(folder);
+    assert_int_equal(count_files(test_folder), 1);
 }
 
 static void reads_refuse_what_is_no_file(void **state)
@@ -480,13 +426,12 @@ static void reads_refuse_what_is_no_file(void **state)
     unsigned char *bytes = (unsigned char *)1;
     size_t count = 9;
     gbt_error err = {0};
-    assert_int_equal(file_read(folder, &bytes, &count, &err), GBT_ERR_IO);
+    assert_int_equal(file_read(test_folder, &bytes, &count, &err), GBT_ERR_IO);
     assert_null(bytes);
     assert_int_equal(count, 0);
-    assert_ptr_equal(strstr(err.text, folder), err.text);
+    assert_ptr_equal(strstr(err.text, test_folder), err.text);
     assert_int_equal(file_read("/nowhere", &bytes, &count, NULL), GBT_ERR_IO);
-    char path[512];
-    assert_ok(file_join(path, sizeof path, folder, "fifo", NULL));
+    const char *path = in_folder("fifo");
     assert_int_equal(mkfifo(path, 0600), 0);
     assert_int_equal(file_read(path, &bytes, &count, NULL), GBT_ERR_IO); /* and does not hang */
     remove(path);
@@ -495,11 +440,10 @@ static void reads_refuse_what_is_no_file(void **state)
 static void ends_tell_files_apart(void **state)
 {
     (void)state;
-    char path[512];
     unsigned char out[12];
     size_t used = 9;
     gbt_error err = {0};
-    assert_ok(file_join(path, sizeof path, folder, "ends", NULL));
+    const char *path = in_folder("ends");
     assert_ok(file_write_atomic(path, "abcde", 5, NULL));
     assert_ok(file_read_ends(path, 2, out, &used, NULL));
     assert_int_equal(used, 12);
@@ -511,15 +455,15 @@ static void ends_tell_files_apart(void **state)
     remove(path);
     assert_int_equal(file_read_ends(path, 2, out, &used, &err), GBT_ERR_IO);
     assert_ptr_equal(strstr(err.text, path), err.text);
-    assert_ok(file_read_ends(folder, 2, out, &used, NULL));
+    assert_ok(file_read_ends(test_folder, 2, out, &used, NULL));
     assert_int_equal(used, 0);
 }
 
 static void folders_and_names(void **state)
 {
     (void)state;
-    char path[512], file[600];
-    assert_ok(file_join(path, sizeof path, folder, "a/b//c", NULL));
+    char file[600];
+    const char *path = in_folder("a/b//c");
     assert_ok(file_make_folder(path, NULL));
     assert_ok(file_make_folder(path, NULL)); /* there already */
     assert_true(file_is_folder(path));
@@ -527,7 +471,6 @@ static void folders_and_names(void **state)
     assert_ok(file_write_atomic(file, "x", 1, NULL));
     assert_int_equal(file_make_folder(file, NULL), GBT_ERR_IO);
     assert_int_equal(file_make_folder("", NULL), GBT_ERR_ARGUMENT);
-    remove_entries(folder);
     char out[8];
     assert_ok(file_join(out, sizeof out, "abc", "def", NULL)); /* 7 and the zero: just fits */
     assert_string_equal(out, "abc/def");
@@ -829,15 +772,15 @@ int main(void)
         cmocka_unit_test(memory_reserve_grows_and_keeps),
         cmocka_unit_test(philox_known_answers),
         cmocka_unit_test(random_numbers_have_their_moments),
-        cmocka_unit_test(files_come_back),
-        cmocka_unit_test(private_files_stay_private),
-        cmocka_unit_test(failed_writes_leave_nothing),
-        cmocka_unit_test(places_are_looked_at),
-        cmocka_unit_test(streams_are_not_replaced),
-        cmocka_unit_test(full_disk_keeps_the_old_file),
-        cmocka_unit_test(reads_refuse_what_is_no_file),
-        cmocka_unit_test(ends_tell_files_apart),
-        cmocka_unit_test(folders_and_names),
+        cmocka_unit_test_setup_teardown(files_come_back, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(private_files_stay_private, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(failed_writes_leave_nothing, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(places_are_looked_at, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(streams_are_not_replaced, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(full_disk_keeps_the_old_file, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(reads_refuse_what_is_no_file, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(ends_tell_files_apart, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(folders_and_names, folder_make, folder_remove),
         cmocka_unit_test(gaussians_resize_pad_zero),
         cmocka_unit_test(image_sizes),
         cmocka_unit_test(blocks_cover_once),
@@ -846,5 +789,5 @@ int main(void)
         cmocka_unit_test(instruction_sets_only_go_down),
         cmocka_unit_test(rotations),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

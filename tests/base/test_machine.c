@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/base/test_machine.c -- limits of made trees of /proc and /sys; events to a listener. */
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include "base/file.h"
 #include "base/log.h"
 #include "base/machine.h"
 #include "base/parallel.h"
-#include "test_support.h"
+#include "folder.h"
 
 enum { FILES_MAX = 6 };
 
@@ -89,15 +85,9 @@ static const machine_case cases[] = {
 static void reads_limits(void **state)
 {
     const machine_case *c = *state;
-    char root[] = "/tmp/gbt_machine_XXXXXX", path[512], folder[512];
-    assert_non_null(mkdtemp(root));
-    for (int i = 0; i < FILES_MAX && c->files[i].path != NULL; i++) {
-        snprintf(path, sizeof path, "%s/%s", root, c->files[i].path);
-        snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
-        assert_ok(file_make_folder(folder, NULL));
-        assert_ok(file_write_atomic(path, c->files[i].text, strlen(c->files[i].text), NULL));
-    }
-    const machine m = machine_read(root);
+    for (int i = 0; i < FILES_MAX && c->files[i].path != NULL; i++)
+        write_text(in_folder("%s", c->files[i].path), c->files[i].text);
+    const machine m = machine_read(test_folder);
     assert_true(m.processors >= 1 && m.processors_allowed >= 1);
     if (m.processors_quota != c->quota)
         fail_msg("quota %g", m.processors_quota);
@@ -106,8 +96,6 @@ static void reads_limits(void **state)
     assert_true(m.memory_limit_bytes <= c->limit &&
                 (c->limit == SIZE_MAX || m.memory_limit_bytes == c->limit));
     assert_string_equal(m.processor, c->processor);
-    snprintf(path, sizeof path, "rm -r '%s'", root);
-    assert_int_equal(system(path), 0);
 }
 
 static void reads_this_machine(void **state)
@@ -182,8 +170,8 @@ int main(void)
     enum { CASES = sizeof cases / sizeof *cases };
     struct CMUnitTest tests[CASES + 3];
     for (int i = 0; i < CASES; i++)
-        tests[i] = (struct CMUnitTest){
-            .name = cases[i].name, .test_func = reads_limits, .initial_state = (void *)&cases[i]};
+        tests[i] =
+            (struct CMUnitTest){cases[i].name, reads_limits, folder_make, folder_remove, (void *)&cases[i]};
     tests[CASES] = (struct CMUnitTest)cmocka_unit_test(reads_this_machine);
     tests[CASES + 1] = (struct CMUnitTest)cmocka_unit_test(tells_a_listener);
     tests[CASES + 2] = (struct CMUnitTest)cmocka_unit_test(threads_follow_the_quota);

@@ -1,14 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/base/test_paged.c -- arrays in files, and files written piece by piece. */
-#include "test_support.h"
-
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include "base/file.h"
 #include "base/large_file.h"
-#include "base/memory.h"
 #include "base/paged.h"
+#include "folder.h"
 
 enum { NUMBERS = 16 << 20 };
 
@@ -95,9 +89,7 @@ static void many_arrays(void **state)
 static void a_file_by_pieces(void **state)
 {
     (void)state;
-    char path[64], temporary[80];
-    snprintf(path, sizeof path, "/tmp/gbt_paged_%ld", (long)getpid());
-    snprintf(temporary, sizeof temporary, "/tmp/.gbt_paged_%ld.tmp", (long)getpid());
+    const char *path = in_folder("a"), *temporary = in_folder(".a.tmp");
     static large_file file;
     assert_ok(large_file_create(path, &file, NULL));
     assert_ok(large_file_put(&file, "ab", 2, NULL));
@@ -122,7 +114,7 @@ static void a_file_by_pieces(void **state)
     assert_ok(large_file_close(&file, false, NULL)); /* closed */
     unlink(path);
     assert_int_equal(large_file_open(path, &file, NULL), GBT_ERR_IO);
-    assert_int_equal(large_file_open("/tmp", &file, NULL), GBT_ERR_IO);
+    assert_int_equal(large_file_open(test_folder, &file, NULL), GBT_ERR_IO);
 }
 
 int main(void)
@@ -132,5 +124,5 @@ int main(void)
         cmocka_unit_test(folders_that_are_not_there), cmocka_unit_test(many_arrays),
         cmocka_unit_test(a_file_by_pieces),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

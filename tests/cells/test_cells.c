@@ -1,11 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/cells/test_cells.c -- pictures cell by cell against those of the same file in memory, on the scenes
    on which renderers fail (docs/stability.md names them A1 to A10); and what is refused. */
-#include "test_support.h"
+#include "folder.h"
 
-#include <unistd.h>
-
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
@@ -16,7 +13,7 @@
 enum { WIDTH = 72, HEIGHT = 56, CHUNK_ROWS = 40 };
 
 static const size_t plenty = (size_t)1 << 30;
-static char ply[64];
+static const char *ply;
 
 static float between(uint64_t stream, uint64_t index, float low, float high)
 {
@@ -87,7 +84,7 @@ static void open_both(both *b, gaussian_cloud *cloud)
     gaussian_middle(b->cloud.mean, b->cloud.count, low, high, b->middle);
     for (size_t i = 0; i < 3 * b->cloud.count; i++)
         b->cloud.mean[i] = (float)((double)b->cloud.mean[i] - b->middle[i % 3]);
-    assert_ok(cell_store_make(ply, "/tmp", plenty, CHUNK_ROWS, &b->store, NULL));
+    assert_ok(cell_store_make(ply, test_folder, plenty, CHUNK_ROWS, &b->store, NULL));
     assert_int_equal(b->store.count, b->cloud.count);
     for (int k = 0; k < 3; k++)
         assert_true(b->store.origin[k] == b->middle[k]);
@@ -477,7 +474,7 @@ static void threads_give_the_same_bits(void **state)
     for (int i = 0; i < 3; i++) {
         cell_store store = {0};
         parallel_set_threads(i + 1);
-        assert_ok(cell_store_make(ply, "/tmp", plenty, CHUNK_ROWS, &store, NULL));
+        assert_ok(cell_store_make(ply, test_folder, plenty, CHUNK_ROWS, &store, NULL));
         assert_ok(cell_draw(&b.drawer, &store, &shot, &b.settings, b.variance, plenty, &picture[i], NULL));
         cell_store_free(&store);
     }
@@ -530,12 +527,8 @@ static void files_that_cannot_be_sorted(void **state)
     (void)state;
     cell_store store = {0};
     gbt_error err = {0};
-    static const char text[] = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n";
-    FILE *file = fopen(ply, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(text, 1, sizeof text - 1, file), sizeof text - 1);
-    fclose(file);
-    assert_int_equal(cell_store_make(ply, "/tmp", plenty, 0, &store, &err), GBT_ERR_FORMAT);
+    write_text(ply, "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n");
+    assert_int_equal(cell_store_make(ply, test_folder, plenty, 0, &store, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "by parts"));
     cell_store_free(&store);
     gaussian_cloud cloud;
@@ -547,7 +540,7 @@ static void files_that_cannot_be_sorted(void **state)
     cell_store_free(&store);
     assert_int_equal(truncate(ply, 20000), 0);
     memset(&err, 0, sizeof err);
-    assert_int_equal(cell_store_make(ply, "/tmp", plenty, 0, &store, &err), GBT_ERR_FORMAT);
+    assert_int_equal(cell_store_make(ply, test_folder, plenty, 0, &store, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "cannot be in the"));
     cell_store_free(&store);
 }
@@ -569,7 +562,7 @@ static void no_memory_is_a_status(void **state)
         image out = {0};
         gbt_error err = {0};
         mem_fail_after(k);
-        gbt_status status = cell_store_make(ply, "/tmp", plenty, CHUNK_ROWS, &store, &err);
+        gbt_status status = cell_store_make(ply, test_folder, plenty, CHUNK_ROWS, &store, &err);
         if (status == GBT_OK)
             status = cell_draw(&drawer, &store, &shot, &settings, 0.25f, plenty, &out, &err);
         mem_fail_after(-1);
@@ -585,18 +578,11 @@ static void no_memory_is_a_status(void **state)
     }
 }
 
-static int make_name(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    snprintf(ply, sizeof ply, "/tmp/gbt_cells_%ld.ply", (long)getpid());
-    return 0;
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    unlink(ply);
-    return 0;
+    const int failed = folder_make(state);
+    ply = in_folder("g.ply");
+    return failed;
 }
 
 int main(void)
@@ -622,5 +608,5 @@ int main(void)
         cmocka_unit_test(files_that_cannot_be_sorted),
         cmocka_unit_test(no_memory_is_a_status),
     };
-    return cmocka_run_group_tests(tests, make_name, remove_file);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

@@ -4,52 +4,19 @@
 #include <jansson.h>
 #include <unistd.h>
 
-#include "base/file.h"
-#include "base/memory.h"
 #include "data/json_out.h"
 #include "data/scene.h"
 #include "command/ball_mesh.h"
 #include "command/expect.h"
+#include "folder.h"
 #include "gbtrace/info.h"
 #include "gbtrace/init.h"
 #include "io/model_file.h"
-#include "test_support.h"
-
-static char folder[] = "/tmp/gbt_eval_XXXXXX";
-
-/** The same name gives the same pointer, so paths stay valid. */
-static const char *in_folder(const char *name)
-{
-    static char paths[8][256];
-    char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    int i = 0;
-    while (i < 7 && paths[i][0] != '\0' && strcmp(paths[i], path) != 0)
-        i++;
-    memcpy(paths[i], path, sizeof path);
-    return paths[i];
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) != NULL ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"cloud.ply", "out.ply",  "out.json",
-                                        "model.gbt", "none.ply", "far.ply"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        unlink(in_folder(names[i]));
-    return rmdir(folder);
-}
 
 /** A cubic grid of side^3 points, 1 apart, at `offset`. */
 static const char *write_grid(const char *name, int side, double offset)
 {
-    const char *path = in_folder(name);
+    const char *path = in_folder("%s", name);
     FILE *file = fopen(path, "w");
     assert_non_null(file);
     fprintf(file,
@@ -149,7 +116,7 @@ static void info_of_a_model(void **state)
     assert_ok(anchors_resize(&m.anchors, 17, NULL));
     assert_ok(decoder_init(&m.decoder, 3, true, 1, NULL));
     assert_ok(model_save(in_folder("model.gbt"), &m, NULL));
-    const char *paths[2] = {in_folder("model.gbt"), folder}; /* the file, and a run folder with it */
+    const char *paths[2] = {in_folder("model.gbt"), test_folder}; /* the file, and a run folder with it */
     for (int i = 0; i < 2; i++) {
         json_t *value = info_as_json(paths[i]);
         assert_string_equal(json_string_value(json_object_get(value, "kind")), "model");
@@ -396,5 +363,5 @@ int main(void)
         cmocka_unit_test(init_refuses),    cmocka_unit_test(init_without_memory),
         cmocka_unit_test(spheres),         cmocka_unit_test(json_of_any_bytes),
     };
-    return cmocka_run_group_tests_name("info and init", tests, make_folder, remove_folder);
+    return cmocka_run_group_tests_name("info and init", tests, folder_make, folder_remove);
 }

@@ -13,6 +13,7 @@
 
 static void cameras(void **state)
 {
+    (void)state;
     static const struct {
         const char *text;
         gbt_status status;
@@ -30,10 +31,10 @@ static void cameras(void **state)
         {"", GBT_ERR_FORMAT, "not usable JSON"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        write_text(*state, "cameras.json", cases[i].text);
+        write_text(in_folder("cameras.json"), cases[i].text);
         scene s;
         gbt_error err = {0};
-        const gbt_status status = cameras_json_load(inside(*state, "cameras.json", 0), &s, &err);
+        const gbt_status status = cameras_json_load(in_folder("cameras.json"), &s, &err);
         check_message(status, &err);
         if (status != cases[i].status || strstr(err.text, cases[i].says) == NULL)
             fail_msg("case %zu: status %d: %s", i, (int)status, err.text);
@@ -60,22 +61,21 @@ static void newest_iteration(void **state)
         "property float f_dc_2\nproperty float opacity\nproperty float scale_0\nproperty float "
         "scale_1\nproperty float scale_2\nproperty float rot_0\n"
         "property float rot_1\nproperty float rot_2\nproperty float rot_3\nend_header\n";
-    const char *folder = *state;
+    (void)state;
     char text[1024];
     result_folder found;
     bool is_there;
-    assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
-    assert_false(is_there || gaussian_file_readable(folder));
+    assert_ok(result_folder_find(test_folder, &found, &is_there, &assert_ok_err_));
+    assert_false(is_there || gaussian_file_readable(test_folder));
     static const int iterations[] = {7000, 30000, 900};
     for (int i = 0; i < 3; i++) {
-        char name[128];
-        snprintf(name, sizeof name, "point_cloud/iteration_%d/point_cloud.ply", iterations[i]);
         snprintf(text, sizeof text, "%s%d 0 0 0 0 0 0 -1 -1 -1 1 0 0 0\n", point, iterations[i]);
-        write_text(folder, name, text);
+        write_text(in_folder("point_cloud/iteration_%d/point_cloud.ply", iterations[i]), text);
     }
-    write_text(folder, "point_cloud/iteration_99999x", "");
-    write_text(folder, "cfg_args", "Namespace(sh_degree=3, source_path='/data/a b', white_background=True)");
-    assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
+    write_text(in_folder("point_cloud/iteration_99999x"), "");
+    write_text(in_folder("cfg_args"),
+               "Namespace(sh_degree=3, source_path='/data/a b', white_background=True)");
+    assert_ok(result_folder_find(test_folder, &found, &is_there, &assert_ok_err_));
     assert_true(is_there && found.iteration == 30000 && found.white_background);
     assert_string_equal(found.source, "/data/a b");
     assert_true(found.downscale == 0);
@@ -91,24 +91,24 @@ static void newest_iteration(void **state)
     static const double downscales[] = {4, 0, 0, 1, 0, 4, 8, 0, 0};
     static const int widths[] = {0, 0, 1200, 0, 0, 0, 0, 1200, 0};
     for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
-        write_text(folder, "cfg_args", resolutions[i]);
-        assert_ok(result_folder_find(folder, &found, &is_there, &assert_ok_err_));
+        write_text(in_folder("cfg_args"), resolutions[i]);
+        assert_ok(result_folder_find(test_folder, &found, &is_there, &assert_ok_err_));
         assert_true(found.downscale == downscales[i] && found.width == widths[i]);
     }
-    assert_true(gaussian_file_readable(folder) && gaussian_file_has_gaussians(folder));
+    assert_true(gaussian_file_readable(test_folder) && gaussian_file_has_gaussians(test_folder));
     gaussian_cloud cloud;
-    assert_ok(gaussian_file_read(folder, &cloud, &assert_ok_err_));
+    assert_ok(gaussian_file_read(test_folder, &cloud, &assert_ok_err_));
     assert_true(cloud.count == 1 && cloud.mean[0] == 30000);
     gaussian_cloud_free(&cloud);
-    write_text(folder, "model.gbt", "");
-    assert_false(gaussian_file_readable(folder));
+    write_text(in_folder("model.gbt"), "");
+    assert_false(gaussian_file_readable(test_folder));
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(cameras, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(newest_iteration, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(cameras, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(newest_iteration, folder_make, folder_remove),
     };
     return cmocka_run_group_tests_name("result folders", tests, NULL, NULL);
 }

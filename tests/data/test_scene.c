@@ -18,7 +18,7 @@ enum { VIEW_COUNT = 9, POINT_COUNT = 5 };
 
 /* Nine images v1.png .. v9.png on a line at x = 1000 + 10 i, five points around (1000, 0, 0), one of them far
    off. */
-static void write_model(const char *folder, bool text, bool with_photos)
+static void write_model(bool text, bool with_photos)
 {
     colmap_image images[VIEW_COUNT] = {0};
     colmap_point points[POINT_COUNT] = {0};
@@ -32,34 +32,31 @@ static void write_model(const char *folder, bool text, bool with_photos)
                                         .params = {10, 10, 3.5, 2.5},
                                         .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1},
                                         .center = {1000 + 10 * i, 1, 2}};
-        char path[200];
-        snprintf(path, sizeof path, "images/%s", names[i]);
         if (with_photos)
-            write_picture(folder, path, 8, 6);
+            write_picture(in_folder("images/%s", names[i]), 8, 6);
     }
     for (int i = 0; i < POINT_COUNT; i++)
         points[i] = (colmap_point){.position = {999 + i, -i, i == 4 ? 1e9 : 0}, .color = {10, 20, 30}};
-    char model[4096];
-    snprintf(model, sizeof model, "%s/sparse/0", folder);
+    const char *model = in_folder("sparse/0");
     assert_ok(colmap_write(model, images, VIEW_COUNT, points, POINT_COUNT, &assert_ok_err_));
     if (text)
         colmap_to_text(model);
 }
 
-static void move(const char *folder, const char *from, const char *to)
+static void move(const char *from, const char *to)
 {
-    make_parent(inside(folder, to, 1));
-    assert_int_equal(rename(inside(folder, from, 0), inside(folder, to, 1)), 0);
+    make_folder_of(in_folder("%s", to));
+    assert_int_equal(rename(in_folder("%s", from), in_folder("%s", to)), 0);
 }
 
 static void recentred(void **state)
 {
-    const char *folder = *state;
-    write_model(folder, false, true);
+    (void)state;
+    write_model(false, true);
     scene s;
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
-    assert_string_equal(s.folder, folder);
+    assert_string_equal(s.folder, test_folder);
     /* The median of the points; the one at 1e9 does not move it. */
     assert_true(s.origin[0] == 1001 && s.origin[1] == -2 && s.origin[2] == 0);
     assert_int_equal(s.view_count, VIEW_COUNT);
@@ -84,25 +81,25 @@ static void recentred(void **state)
 
 static void folder_layouts(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     static const char *const files[] = {"cameras.bin", "images.bin", "points3D.bin"};
     static const char *const places[] = {"sparse/0", "sparse", "."};
-    write_model(folder, false, true);
+    write_model(false, true);
     scene s;
     char from[64], to[64];
     for (int place = 0; place < 3; place++) {
         for (int i = 0; i < 3 && place > 0; i++) {
             snprintf(from, sizeof from, "%s/%s", places[place - 1], files[i]);
             snprintf(to, sizeof to, "%s/%s", places[place], files[i]);
-            move(folder, from, to);
+            move(from, to);
         }
-        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+        assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
         assert_int_equal(s.view_count, VIEW_COUNT);
         scene_free(&s);
     }
     /* Photos may lie in the folder itself. */
-    move(folder, "images/v3.png", "v3.png");
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    move("images/v3.png", "v3.png");
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_non_null(strstr(s.views[2].path, "/v3.png"));
     assert_null(strstr(s.views[2].path, "images"));
     scene_free(&s);
@@ -112,26 +109,24 @@ static void folder_layouts(void **state)
  */
 static void colmap_elsewhere(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     scene s;
-    write_model(folder, false, true);
-    move(folder, "sparse", "colmap/sparse");
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    write_model(false, true);
+    move("sparse", "colmap/sparse");
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
     assert_int_equal(s.view_count, VIEW_COUNT);
     scene_free(&s);
-    write_text(folder, "transforms.json",
+    write_text(in_folder("transforms.json"),
                "{\"fl_x\": 8, \"frames\": [{\"file_path\": \"images/v1.png\", \"transform_matrix\": "
                "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "transforms");
     scene_free(&s);
-    unlink(inside(folder, "transforms.json", 0));
+    unlink(in_folder("transforms.json"));
 
-    char data[8192], says[3][512];
-    snprintf(data, sizeof data, "%s", inside(folder, "", 0));
-    if (data[strlen(data) - 1] == '/')
-        data[strlen(data) - 1] = '\0';
+    const char *data = test_folder;
+    char says[3][512];
     snprintf(says[0], sizeof says[0],
              "a COLMAP model is in %.100s/sparse/1 (wanted: moved to %.100s/sparse/0)", data, data);
     snprintf(says[1], sizeof says[1],
@@ -144,39 +139,39 @@ static void colmap_elsewhere(void **state)
         {{"dense/sparse", "a/b/sparse/0"}, {"dense/images", "a/b/images"}}};
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 2; k++)
-            move(folder, moves[i][k][0], moves[i][k][1]);
+            move(moves[i][k][0], moves[i][k][1]);
         gbt_error err = {0};
         assert_int_equal(scene_load(data, NULL, &s, &err), GBT_ERR_FORMAT);
         check_message(GBT_ERR_FORMAT, &err);
         if (strstr(err.text, says[i]) == NULL)
             fail_msg("%s", err.text);
     }
-    assert_ok(scene_load(inside(folder, "a/b", 0), NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(in_folder("a/b"), NULL, &s, &assert_ok_err_));
     scene_free(&s);
 }
 
 static void binary_is_preferred(void **state)
 {
-    const char *folder = *state;
-    write_model(folder, true, true);
+    (void)state;
+    write_model(true, true);
     scene s;
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-txt");
     scene_free(&s);
-    write_model(folder, false, false);
-    write_text(folder, "sparse/0/rigs.bin", "ignored");
-    write_text(folder, "sparse/0/frames.bin", "ignored");
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    write_model(false, false);
+    write_text(in_folder("sparse/0/rigs.bin"), "ignored");
+    write_text(in_folder("sparse/0/frames.bin"), "ignored");
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-bin");
     scene_free(&s);
     /* 29: an incomplete binary set gives way to a complete text set, but not to an incomplete one. */
-    unlink(inside(folder, "sparse/0/images.bin", 0));
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    unlink(in_folder("sparse/0/images.bin"));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "colmap-txt");
     scene_free(&s);
-    unlink(inside(folder, "sparse/0/points3D.txt", 0));
+    unlink(in_folder("sparse/0/points3D.txt"));
     gbt_error err = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "images.bin: missing (wanted cameras, images and points3D together)"));
     assert_null(s.views);
 }
@@ -185,8 +180,8 @@ static void binary_is_preferred(void **state)
    nothing to do. */
 static void missing_photos(void **state)
 {
-    const char *folder = *state;
-    write_model(folder, false, true);
+    (void)state;
+    write_model(false, true);
     scene s;
     for (int i = 1; i <= VIEW_COUNT; i++) {
         char name[32];
@@ -194,13 +189,13 @@ static void missing_photos(void **state)
                  i == 1   ? 2
                  : i == 2 ? 1
                           : i); /* a first and a later one */
-        unlink(inside(folder, name, 0));
+        unlink(in_folder("%s", name));
         if (i == 1)
-            assert_ok(file_make_folder(inside(folder, "images/v2.png", 0),
-                                       &assert_ok_err_)); /* a folder is not a photo */
+            assert_ok(file_make_folder(in_folder("images/v2.png"), &assert_ok_err_)); /* a folder is not a
+                                                                                         photo */
         if (i == VIEW_COUNT)
             break;
-        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+        assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
         assert_int_equal(s.photos_missing, i);
         assert_int_equal(s.view_count, VIEW_COUNT - i);
         assert_string_equal(s.views[0].name,
@@ -213,7 +208,7 @@ static void missing_photos(void **state)
         scene_free(&s);
     }
     gbt_error err = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_IO);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err), GBT_ERR_IO);
     check_message(GBT_ERR_IO, &err);
     if (strstr(err.text, "all 9 photos are missing: v1.png, v2.png, v3.png, ...") == NULL)
         fail_msg("%s", err.text);
@@ -230,28 +225,28 @@ static void keep_first(const gbt_event *event, void *text)
 /* COLMAP's NAME.png, and two other habits; what has none stays without, and a warning counts it. */
 static void masks_are_found(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     char text[300] = "";
-    write_model(folder, false, true);
+    write_model(false, true);
     static const char *const files[] = {"masks/v1.png.png", "masks/v2.png"};
     scene s;
     gbt_listen(keep_text, text);
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_null(s.views[0].mask_path);
     assert_null(strstr(text, "mask"));
     scene_free(&s);
-    write_picture(folder, "masks/other.png", 8, 6);
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    write_picture(in_folder("masks/other.png"), 8, 6);
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_null(s.views[0].mask_path);
     assert_non_null(strstr(text, "counted whole: 9 of 9 photos (wanted masks/NAME.png)"));
     scene_free(&s);
     for (int i = 0; i < 2; i++)
-        write_picture(folder, files[i], 8, 6);
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+        write_picture(in_folder("%s", files[i]), 8, 6);
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     gbt_listen(NULL, NULL);
     assert_non_null(strstr(text, "counted whole: 7 of 9 photos"));
     for (int i = 0; i < 2; i++)
-        assert_string_equal(s.views[i].mask_path, inside(folder, files[i], 0));
+        assert_string_equal(s.views[i].mask_path, in_folder("%s", files[i]));
     assert_null(s.views[2].mask_path);
     scene_free(&s);
 }
@@ -268,7 +263,7 @@ static const char empty_count[8];
 
 static void nothing_to_load(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     static const place_case cases[] = {
         {"nothing there", NULL, NULL, "no/such", GBT_ERR_IO, "no such file or folder"},
         {"empty folder", NULL, NULL, ".", GBT_ERR_FORMAT,
@@ -291,24 +286,24 @@ static void nothing_to_load(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         if (cases[i].file != NULL)
-            write_text(folder, cases[i].file, cases[i].text);
+            write_text(in_folder("%s", cases[i].file), cases[i].text);
         scene s;
         gbt_error err = {0};
-        const gbt_status status = scene_load(inside(folder, cases[i].path, 0), NULL, &s, &err);
+        const gbt_status status = scene_load(in_folder("%s", cases[i].path), NULL, &s, &err);
         check_message(status, &err);
         if (status != cases[i].status || strstr(err.text, cases[i].says) == NULL)
             fail_msg("%s: status %d, message: %s", cases[i].name, (int)status, err.text);
         assert_null(s.views);
     }
     /* 28: a model without images. */
-    for (int i = 0; i < 3; i++)
-        write_bytes(
-            folder,
-            (const char *const[]){"sparse/cameras.bin", "sparse/images.bin", "sparse/points3D.bin"}[i],
-            empty_count, 8);
+    assert_ok(file_make_folder(in_folder("sparse"), &assert_ok_err_));
+    for (int i = 0; i < 3; i++) {
+        static const char *const names[] = {"cameras", "images", "points3D"};
+        assert_ok(file_write_atomic(in_folder("sparse/%s.bin", names[i]), empty_count, 8, &assert_ok_err_));
+    }
     scene s;
     gbt_error err = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "images.bin: no registered image in the model"));
 }
 
@@ -405,9 +400,9 @@ static size_t count_tests(const scene *s)
 /* Held-out photos are gone, and each fold of the others is held out once. */
 static void validation_leaves_held_out_photos_alone(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     enum { EVERY = 3, FOLDS = 2 };
-    write_model(folder, false, true);
+    write_model(false, true);
     for (int offset = 0; offset < EVERY; offset++) {
         size_t times[VIEW_COUNT] = {0};
         for (int fold = 0; fold < FOLDS; fold++) {
@@ -417,7 +412,7 @@ static void validation_leaves_held_out_photos_alone(void **state)
                                        .offset = offset,
                                        .validate_every = FOLDS,
                                        .validate_offset = fold};
-            assert_ok(scene_load(folder, &split, &s, &assert_ok_err_));
+            assert_ok(scene_load(test_folder, &split, &s, &assert_ok_err_));
             for (size_t i = 0; i < s.view_count; i++) {
                 assert_int_not_equal(s.views[i].rank % EVERY, offset);
                 times[s.views[i].rank] += s.views[i].is_test;
@@ -430,24 +425,24 @@ static void validation_leaves_held_out_photos_alone(void **state)
     scene s;
     gbt_error none = {0};
     const scene_split far = {.kind = SCENE_SPLIT_NONE, .validate_every = 100, .validate_offset = 50};
-    assert_int_equal(scene_load(folder, &far, &s, &none), GBT_ERR_ARGUMENT);
+    assert_int_equal(scene_load(test_folder, &far, &s, &none), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(none.text, "validation holds out none"));
 }
 
 /* Photos that were held out and are gone; a name that no view ever had is still an error. */
 static void missing_photos_on_a_list(void **state)
 {
-    const char *folder = *state;
-    char list[4096], text[300] = "";
-    snprintf(list, sizeof list, "%s/list.txt", folder);
+    (void)state;
+    char text[300] = "";
+    const char *list = in_folder("list.txt");
     const scene_split by_list = {.kind = SCENE_SPLIT_LIST, .list_path = list};
-    write_model(folder, false, true);
-    unlink(inside(folder, "images/v2.png", 0));
-    unlink(inside(folder, "images/v5.png", 0));
-    write_text(folder, "list.txt", "v5.png\nv9.png\nv2.png\n");
+    write_model(false, true);
+    unlink(in_folder("images/v2.png"));
+    unlink(in_folder("images/v5.png"));
+    write_text(list, "v5.png\nv9.png\nv2.png\n");
     scene s;
     gbt_listen(keep_first, text);
-    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, &by_list, &s, &assert_ok_err_));
     gbt_listen(NULL, NULL);
     assert_non_null(strstr(text, "list.txt: names of photos that are missing, passed over: 2"));
     assert_true(s.view_count == VIEW_COUNT - 2 && count_tests(&s) == 1 && s.views[6].is_test);
@@ -455,39 +450,38 @@ static void missing_photos_on_a_list(void **state)
     static const char *const bad[] = {"v5.png\nv22.png\n", "v5.png\nv\n", "v5.png\nv2.pn\n"};
     for (size_t i = 0; i < 3; i++) {
         gbt_error err = {0};
-        write_text(folder, "list.txt", bad[i]);
-        assert_int_equal(scene_load(folder, &by_list, &s, &err), GBT_ERR_FORMAT);
+        write_text(list, bad[i]);
+        assert_int_equal(scene_load(test_folder, &by_list, &s, &err), GBT_ERR_FORMAT);
         assert_non_null(strstr(err.text, "list.txt:2: no image of the data set has this name"));
     }
 }
 
 static void splits(void **state)
 {
-    const char *folder = *state;
-    write_model(folder, false, true);
+    (void)state;
+    write_model(false, true);
     scene s;
     for (int every = 2; every <= 10; every++) {
-        assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = every}, &s,
+        assert_ok(scene_load(test_folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = every}, &s,
                              &assert_ok_err_));
         assert_int_equal(count_tests(&s), (VIEW_COUNT + (size_t)every - 1) / (size_t)every);
         for (size_t i = 0; i < VIEW_COUNT; i++)
             assert_int_equal(s.views[i].is_test, i % (size_t)every == 0);
         scene_free(&s);
     }
-    assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 0);
     scene_free(&s);
 
-    char list[4096];
-    snprintf(list, sizeof list, "%s/list.txt", folder);
+    const char *list = in_folder("list.txt");
     const scene_split by_list = {.kind = SCENE_SPLIT_LIST, .list_path = list};
-    write_text(folder, "list.txt", "v9.png\r\n\nv2.png \nv9.png");
-    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
+    write_text(in_folder("list.txt"), "v9.png\r\n\nv2.png \nv9.png");
+    assert_ok(scene_load(test_folder, &by_list, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 2);
     assert_true(s.views[1].is_test && s.views[8].is_test);
     scene_free(&s);
-    write_text(folder, "list.txt", "\xef\xbb\xbfv9.png\n");
-    assert_ok(scene_load(folder, &by_list, &s, &assert_ok_err_));
+    write_text(in_folder("list.txt"), "\xef\xbb\xbfv9.png\n");
+    assert_ok(scene_load(test_folder, &by_list, &s, &assert_ok_err_));
     assert_true(count_tests(&s) == 1 && s.views[8].is_test);
     scene_free(&s);
     static const struct {
@@ -501,37 +495,38 @@ static void splits(void **state)
     };
     for (size_t i = 0; i < 2; i++) {
         gbt_error err = {0};
-        write_text(folder, "list.txt", bad[i].text);
-        assert_int_equal(scene_load(folder, &by_list, &s, &err), bad[i].status);
+        write_text(in_folder("list.txt"), bad[i].text);
+        assert_int_equal(scene_load(test_folder, &by_list, &s, &err), bad[i].status);
         check_message(bad[i].status, &err);
         assert_non_null(strstr(err.text, bad[i].says));
         assert_null(s.views);
     }
     unlink(list);
     gbt_error err = {0};
-    assert_int_equal(scene_load(folder, &by_list, &s, &err), GBT_ERR_IO);
+    assert_int_equal(scene_load(test_folder, &by_list, &s, &err), GBT_ERR_IO);
     gbt_error err2 = {0};
-    assert_int_equal(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = 1}, &s, &err2),
-                     GBT_ERR_ARGUMENT);
+    assert_int_equal(
+        scene_load(test_folder, &(scene_split){.kind = SCENE_SPLIT_EVERY, .every = 1}, &s, &err2),
+        GBT_ERR_ARGUMENT);
 }
 
 static void transforms_folder(void **state)
 {
-    const char *folder = *state;
-    write_picture(folder, "photos/b.png", 8, 6);
-    write_picture(folder, "photos/a.png", 8, 6);
-    write_text(folder, "points.ply",
+    (void)state;
+    write_picture(in_folder("photos/b.png"), 8, 6);
+    write_picture(in_folder("photos/a.png"), 8, 6);
+    write_text(in_folder("points.ply"),
                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
                "z\nend_header\n5 6 7\n");
     static const char text[] = "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"points.ply\", "
                                "\"frames\": [{\"file_path\": \"./photos/b.png\", \"transform_matrix\": "
                                "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},{\"file_path\": \"photos/a\", "
                                "\"transform_matrix\": [[1,0,0,11],[0,1,0,22],[0,0,1,33],[0,0,0,1]]}]}";
-    write_text(folder, "transforms.json", text);
+    write_text(in_folder("transforms.json"), text);
     scene s;
     for (int by_file = 0; by_file < 2; by_file++) {
-        assert_ok(scene_load(by_file == 0 ? folder : inside(folder, "transforms.json", 0), NULL, &s,
-                             &assert_ok_err_));
+        assert_ok(
+            scene_load(by_file == 0 ? test_folder : in_folder("transforms.json"), NULL, &s, &assert_ok_err_));
         assert_string_equal(s.source, "transforms");
         assert_int_equal(s.view_count, 2);
         assert_string_equal(s.views[0].name, "photos/a");
@@ -545,28 +540,28 @@ static void transforms_folder(void **state)
         scene_free(&s);
     }
     /* Without points the origin is the median of the cameras, the lower one of two. */
-    unlink(inside(folder, "points.ply", 0));
+    unlink(in_folder("points.ply"));
     char rest[1024];
     snprintf(rest, sizeof rest, "{\"w\": 8, \"h\": 6, \"fl_x\": 10, %s", strstr(text, "\"frames\""));
-    write_text(folder, "transforms.json", rest);
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    write_text(in_folder("transforms.json"), rest);
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_true(s.origin[0] == 10 && s.origin[1] == 20 && s.origin[2] == 30);
     assert_int_equal(s.points.count, 0);
     assert_non_null(s.points.position);
     scene_free(&s);
     /* A named cloud that is missing, and two frames of one photo, are errors. */
-    write_text(folder, "transforms.json", text);
+    write_text(in_folder("transforms.json"), text);
     gbt_error err2 = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err2), GBT_ERR_IO);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err2), GBT_ERR_IO);
     assert_non_null(strstr(err2.text, "points.ply"));
     snprintf(rest, sizeof rest,
              "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"frames\": ["
              "{\"file_path\": \"./photos/b.png\", \"transform_matrix\": "
              "[[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]},{\"file_path\": \"photos/b.png\", "
              "\"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
-    write_text(folder, "transforms.json", rest);
+    write_text(in_folder("transforms.json"), rest);
     gbt_error err3 = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err3), GBT_ERR_FORMAT);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err3), GBT_ERR_FORMAT);
     assert_non_null(strstr(err3.text, "duplicate image name: photos/b.png"));
 }
 
@@ -579,6 +574,7 @@ static int by_value(const void *a, const void *b)
 
 static void origin_is_the_median(void **state)
 {
+    (void)state;
     for (uint64_t seed = 0; seed < 60; seed++) {
         const size_t count = 1 + (size_t)(seed * 7 % 40);
         float *position = malloc(count * 3 * sizeof *position);
@@ -590,10 +586,10 @@ static void origin_is_the_median(void **state)
                           : seed % 4 == 2 ? u * 1e11f
                                           : -fabsf(u);
         }
-        assert_ok(ply_write(inside(*state, "m.ply", 0),
-                            &(ply_cloud){.vertex_count = count, .position = position}, &assert_ok_err_));
+        assert_ok(ply_write(in_folder("m.ply"), &(ply_cloud){.vertex_count = count, .position = position},
+                            &assert_ok_err_));
         scene s;
-        assert_ok(scene_load(inside(*state, "m.ply", 0), NULL, &s, &assert_ok_err_));
+        assert_ok(scene_load(in_folder("m.ply"), NULL, &s, &assert_ok_err_));
         assert_string_equal(s.source, "ply");
         assert_int_equal(s.view_count, 0);
         for (size_t k = 0; k < 3; k++) {
@@ -626,26 +622,22 @@ static void extent_is_positive(void **state)
    behind (the sanitizer sees). */
 static void no_memory(void **state)
 {
-    const char *folder = *state;
-    write_model(folder, false, false);
+    (void)state;
+    write_model(false, false);
     for (int i = 2; i <= VIEW_COUNT; i++) { /* the first is missing */
-        char name[32];
-        snprintf(name, sizeof name, "images/v%d.png", i);
-        write_text(folder, name, "not read here");
+        write_text(in_folder("images/v%d.png", i), "not read here");
     }
-    write_text(folder, "j/a.png", "not read here");
-    write_text(folder, "j/p.ply",
+    write_text(in_folder("j/a.png"), "not read here");
+    write_text(in_folder("j/p.ply"),
                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
                "z\nend_header\n5 6 7\n");
     write_text(
-        folder, "j/transforms.json",
+        in_folder("j/transforms.json"),
         "{\"w\": 8, \"h\": 6, \"fl_x\": 10, \"ply_file_path\": \"p.ply\", \"frames\": [{\"file_path\": "
         "\"a\", \"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}");
-    write_text(folder, "list.txt", "v9.png\n");
-    char list[4096], path[4096];
-    snprintf(list, sizeof list, "%s/list.txt", folder);
+    write_text(in_folder("list.txt"), "v9.png\n");
+    const char *list = in_folder("list.txt"), *j = in_folder("j");
     for (int which = 0; which < 2; which++) {
-        snprintf(path, sizeof path, "%s%s", folder, which == 0 ? "" : "/j");
         const scene_split split = {.kind = which == 0 ? SCENE_SPLIT_LIST : SCENE_SPLIT_NONE,
                                    .list_path = list};
         long failures = 0;
@@ -653,7 +645,7 @@ static void no_memory(void **state)
             scene s;
             gbt_error err = {0};
             mem_fail_after(failures);
-            status = scene_load(path, &split, &s, &err);
+            status = scene_load(which == 0 ? test_folder : j, &split, &s, &err);
             mem_fail_after(-1);
             check_message(status, &err);
             if (status != GBT_OK) {
@@ -717,20 +709,18 @@ static void resize_is_the_area_mean(void **state)
 /* Blender's synthetic scenes: two files, names without endings, one angle for all. */
 static void blender_folder(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     static const char form[] =
         "{\"camera_angle_x\": 0.7853981633974483, \"frames\": [{\"file_path\": \"./%s/r_0\", "
         "\"transform_matrix\": [[1,0,0,%d],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}]}";
     static const char *const sets[] = {"train", "val", "test"};
     scene s;
     for (int i = 0; i < 3; i++) {
-        char text[512], name[64];
-        snprintf(name, sizeof name, "%s/r_0.png", sets[i]);
-        write_picture(folder, name, 8, 6);
-        snprintf(name, sizeof name, "transforms_%s.json", sets[i]);
+        char text[512];
+        write_picture(in_folder("%s/r_0.png", sets[i]), 8, 6);
         snprintf(text, sizeof text, form, sets[i], i);
-        write_text(folder, name, text);
-        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+        write_text(in_folder("transforms_%s.json", sets[i]), text);
+        assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
         assert_string_equal(s.source, "blender");
         assert_int_equal(s.has_split, i > 0);
         assert_int_equal(s.view_count, i == 0 ? 1 : 2);
@@ -748,11 +738,11 @@ static void blender_folder(void **state)
         scene_free(&s);
     }
     /* Another split replaces the data set's. */
-    assert_ok(scene_load(folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, &(scene_split){.kind = SCENE_SPLIT_NONE}, &s, &assert_ok_err_));
     assert_int_equal(count_tests(&s), 0);
     scene_free(&s);
     /* By its name a file is a data set like any other. */
-    assert_ok(scene_load(inside(folder, "transforms_test.json", 0), NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(in_folder("transforms_test.json"), NULL, &s, &assert_ok_err_));
     assert_string_equal(s.source, "transforms");
     assert_int_equal(s.view_count, 1);
     scene_free(&s);
@@ -761,7 +751,7 @@ static void blender_folder(void **state)
 /* A file that holds out nothing is as none; what is trained on is not held out. */
 static void blender_without_a_split(void **state)
 {
-    const char *folder = *state;
+    (void)state;
 #define VIEW(name, x)                                                                                        \
     "{\"file_path\": \"" name "\", \"transform_matrix\": [[1,0,0," x "],[0,1,0,2],[0,0,1,3],[0,0,0,1]]}"
 #define BLENDER "{\"camera_angle_x\": 0.7, \"frames\": ["
@@ -780,18 +770,19 @@ static void blender_without_a_split(void **state)
     };
     char text[300];
     scene s;
-    write_picture(folder, "train/0.png", 8, 6);
-    write_picture(folder, "train/1.png", 8, 6);
-    write_picture(folder, "val/0.png", 8, 6);
-    write_text(folder, "transforms_train.json", BLENDER VIEW("train/0", "1") "," VIEW("train/1", "2") "]}");
+    write_picture(in_folder("train/0.png"), 8, 6);
+    write_picture(in_folder("train/1.png"), 8, 6);
+    write_picture(in_folder("val/0.png"), 8, 6);
+    write_text(in_folder("transforms_train.json"),
+               BLENDER VIEW("train/0", "1") "," VIEW("train/1", "2") "]}");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        write_text(folder, "transforms_test.json", cases[i].test);
-        unlink(inside(folder, "transforms_val.json", 0));
+        write_text(in_folder("transforms_test.json"), cases[i].test);
+        unlink(in_folder("transforms_val.json"));
         if (cases[i].val != NULL)
-            write_text(folder, "transforms_val.json", cases[i].val);
+            write_text(in_folder("transforms_val.json"), cases[i].val);
         text[0] = '\0';
         gbt_listen(keep_text, text);
-        assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+        assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
         gbt_listen(NULL, NULL);
         assert_int_equal(text[0] != '\0', cases[i].says[0] != '\0');
         if (strstr(text, cases[i].says) == NULL)
@@ -805,9 +796,9 @@ static void blender_without_a_split(void **state)
         assert_int_equal(count_tests(&s), 1);
         scene_free(&s);
     }
-    write_text(folder, "transforms_train.json", BLENDER "]}");
+    write_text(in_folder("transforms_train.json"), BLENDER "]}");
     gbt_error err = {0};
-    assert_int_equal(scene_load(folder, NULL, &s, &err), GBT_ERR_FORMAT);
+    assert_int_equal(scene_load(test_folder, NULL, &s, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "transforms_train.json: frames is not a list with at least one entry"));
 #undef BLENDER
 #undef VIEW
@@ -816,7 +807,7 @@ static void blender_without_a_split(void **state)
 /* nerfstudio's mask_path and train_filenames; instant-ngp's x_fov. */
 static void transforms_masks_and_split(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     static const char form[] =
         "{\"x_fov\": 45, \"train_filenames\": [\"./b.png\"], \"frames\": ["
         "{\"file_path\": \"a.png\", \"mask_path\": %s, \"transform_matrix\": "
@@ -833,16 +824,16 @@ static void transforms_masks_and_split(void **state)
         {"\"../m.png\"", GBT_ERR_FORMAT, "'..'"},
         {"7", GBT_ERR_FORMAT, "mask_path: wanted a string"},
     };
-    write_picture(folder, "a.png", 8, 6);
-    write_picture(folder, "b.png", 8, 6);
-    write_picture(folder, "m.png", 8, 6);
+    write_picture(in_folder("a.png"), 8, 6);
+    write_picture(in_folder("b.png"), 8, 6);
+    write_picture(in_folder("m.png"), 8, 6);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char text[1024];
         snprintf(text, sizeof text, form, cases[i].mask);
-        write_text(folder, "transforms.json", text);
+        write_text(in_folder("transforms.json"), text);
         scene s;
         gbt_error err = {0};
-        const gbt_status status = scene_load(folder, NULL, &s, &err);
+        const gbt_status status = scene_load(test_folder, NULL, &s, &err);
         check_message(status, &err);
         if (status != cases[i].status || strstr(err.text, cases[i].says) == NULL)
             fail_msg("%s: status %d: %s", cases[i].mask, (int)status, err.text);
@@ -865,10 +856,10 @@ static void transforms_masks_and_split(void **state)
                  "{\"x_fov\": 45, \"train_filenames\": %s, \"frames\": [{\"file_path\": \"a.png\", "
                  "\"transform_matrix\": [[1,0,0,10],[0,1,0,20],[0,0,1,30],[0,0,0,1]]}]}",
                  bad[i].list);
-        write_text(folder, "transforms.json", text);
+        write_text(in_folder("transforms.json"), text);
         scene s;
         gbt_error err = {0};
-        assert_int_not_equal(scene_load(folder, NULL, &s, &err), GBT_OK);
+        assert_int_not_equal(scene_load(test_folder, NULL, &s, &err), GBT_OK);
         if (strstr(err.text, bad[i].says) == NULL)
             fail_msg("%s", err.text);
     }
@@ -877,15 +868,15 @@ static void transforms_masks_and_split(void **state)
 /* Backslashes are slashes where nothing has the name as it is written. */
 static void transforms_from_windows(void **state)
 {
-    const char *folder = *state;
-    write_picture(folder, "images/a.png", 8, 6);
-    write_picture(folder, "images/b.png", 8, 6);
-    write_picture(folder, "images\\a.png.png", 8, 6);
-    write_picture(folder, "masks/a.png", 8, 6);
-    write_text(folder, "points/p.ply",
+    (void)state;
+    write_picture(in_folder("images/a.png"), 8, 6);
+    write_picture(in_folder("images/b.png"), 8, 6);
+    write_picture(in_folder("images\\a.png.png"), 8, 6);
+    write_picture(in_folder("masks/a.png"), 8, 6);
+    write_text(in_folder("points/p.ply"),
                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
                "z\nend_header\n1 2 3\n");
-    write_text(folder, "transforms.json",
+    write_text(in_folder("transforms.json"),
                "{\"fl_x\": 10, \"ply_file_path\": \".\\\\points\\\\p.ply\", \"train_filenames\": "
                "[\".\\\\images\\\\b.png\", \"images\\\\a.png.png\"], \"frames\": ["
                "{\"file_path\": \"images\\\\a\", \"mask_path\": \"masks\\\\a.png\", \"transform_matrix\": "
@@ -900,7 +891,7 @@ static void transforms_from_windows(void **state)
     } want[] = {
         {"images/a", true, true}, {"images/b.png", false, false}, {"images\\a.png.png", false, false}};
     scene s;
-    assert_ok(scene_load(folder, NULL, &s, &assert_ok_err_));
+    assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_int_equal(s.view_count, 3);
     assert_int_equal(s.points.count, 1);
     for (int i = 0; i < 3; i++) {
@@ -913,10 +904,10 @@ static void transforms_from_windows(void **state)
 
 static void photos(void **state)
 {
-    const char *folder = *state;
-    write_picture(folder, "p.png", 8, 6);
+    (void)state;
+    write_picture(in_folder("p.png"), 8, 6);
     char path[4096];
-    snprintf(path, sizeof path, "%s/p.png", folder);
+    snprintf(path, sizeof path, "%s/p.png", test_folder);
     scene_view view = {
         .name = path, .path = path, .camera = {.model = GBT_CAMERA_PINHOLE, .width = 8, .height = 6}};
     image im;
@@ -957,13 +948,13 @@ static void photos(void **state)
 /* Alpha is composited on black; values that are not numbers do not survive. */
 static void photo_alpha_and_nan(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     char path[4096];
     image im;
     assert_ok(image_alloc(&im, 2, 1, 4, &assert_ok_err_));
     const float pixels[8] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f};
     memcpy(im.pixels, pixels, sizeof pixels);
-    snprintf(path, sizeof path, "%s/alpha.png", folder);
+    snprintf(path, sizeof path, "%s/alpha.png", test_folder);
     assert_ok(image_write(path, &im, &assert_ok_err_));
     image_free(&im);
     scene_view view = {.name = path, .path = path, .camera = {.width = 2, .height = 1}};
@@ -976,7 +967,7 @@ static void photo_alpha_and_nan(void **state)
     assert_ok(image_alloc(&im, 2, 1, 3, &assert_ok_err_));
     const float poisoned[6] = {0.5f, NAN, INFINITY, 0.25f, 0.5f, 0.75f};
     memcpy(im.pixels, poisoned, sizeof poisoned);
-    snprintf(path, sizeof path, "%s/nan.exr", folder);
+    snprintf(path, sizeof path, "%s/nan.exr", test_folder);
     assert_ok(image_write(path, &im, &assert_ok_err_));
     image_free(&im);
     assert_ok(scene_read_photo(&view, 2, 1, &im, &assert_ok_err_));
@@ -989,7 +980,7 @@ static void photo_alpha_and_nan(void **state)
    glows, and has no opacity. */
 static void alpha_of_an_exr(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     static const gbt_alpha kinds[] = {GBT_ALPHA_BLACK, GBT_ALPHA_WHITE, GBT_ALPHA_MASK};
     static const float pixels[16] = {1, 0.6f, 0.2f, 1, 1, 0.6f, 0.2f, 0.4f, 0.2f, 0.4f, 1, 0.8f, 0, 0, 0, 0},
                        glow = 0.5f;
@@ -1000,7 +991,7 @@ static void alpha_of_an_exr(void **state)
         for (int i = 0; i < 16; i++)
             im.pixels[i] = exr && i % 4 < 3 ? pixels[i] * pixels[i - i % 4 + 3] : pixels[i];
         im.pixels[12] = exr ? glow : 0;
-        snprintf(path[exr], sizeof path[exr], "%s/alpha.%s", folder, exr ? "exr" : "png");
+        snprintf(path[exr], sizeof path[exr], "%s/alpha.%s", test_folder, exr ? "exr" : "png");
         assert_ok(image_write(path[exr], &im, &assert_ok_err_));
     }
     image_free(&im);
@@ -1031,10 +1022,10 @@ static void alpha_of_an_exr(void **state)
 /* A mask of 0 and 1, of 0 and 255, lossy, half the size; alpha as a mask, on white; and what is no mask. */
 static void masked_photos(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     char photo[4096], mask_path[4096];
-    snprintf(photo, sizeof photo, "%s/p.png", folder);
-    snprintf(mask_path, sizeof mask_path, "%s/m.exr", folder);
+    snprintf(photo, sizeof photo, "%s/p.png", test_folder);
+    snprintf(mask_path, sizeof mask_path, "%s/m.exr", test_folder);
     image im;
     assert_ok(image_alloc(&im, 4, 2, 4, &assert_ok_err_));
     for (int i = 0; i < 8; i++)
@@ -1091,11 +1082,11 @@ static void masked_photos(void **state)
 /* Light in any channel counts, and only where it is opaque: 1, 2, 3 and 4 channels. */
 static void masks_of_any_color(void **state)
 {
-    const char *folder = *state;
+    (void)state;
     char photo[4096], mask_path[4096];
-    snprintf(photo, sizeof photo, "%s/p.png", folder);
-    snprintf(mask_path, sizeof mask_path, "%s/m.png", folder);
-    write_picture(folder, "p.png", 4, 1);
+    snprintf(photo, sizeof photo, "%s/p.png", test_folder);
+    snprintf(mask_path, sizeof mask_path, "%s/m.png", test_folder);
+    write_picture(in_folder("p.png"), 4, 1);
     static const struct {
         int channels;
         float values[16];
@@ -1234,33 +1225,32 @@ int main(void)
 {
     enum { REAL_COUNT = sizeof real_cases / sizeof real_cases[0] };
     const struct CMUnitTest fixed[] = {
-        cmocka_unit_test_setup_teardown(recentred, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(folder_layouts, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(colmap_elsewhere, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(binary_is_preferred, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(missing_photos, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(masks_are_found, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(nothing_to_load, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(recentred, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(folder_layouts, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(colmap_elsewhere, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(binary_is_preferred, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(missing_photos, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(masks_are_found, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(nothing_to_load, folder_make, folder_remove),
         cmocka_unit_test(too_long_path),
         cmocka_unit_test(parse_split),
-        cmocka_unit_test_setup_teardown(splits, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(missing_photos_on_a_list, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(validation_leaves_held_out_photos_alone, make_temporary,
-                                        remove_temporary),
-        cmocka_unit_test_setup_teardown(transforms_folder, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(blender_folder, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(blender_without_a_split, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(transforms_masks_and_split, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(transforms_from_windows, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(alpha_of_an_exr, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(masked_photos, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(masks_of_any_color, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(origin_is_the_median, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(splits, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(missing_photos_on_a_list, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(validation_leaves_held_out_photos_alone, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(transforms_folder, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(blender_folder, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(blender_without_a_split, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(transforms_masks_and_split, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(transforms_from_windows, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(alpha_of_an_exr, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(masked_photos, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(masks_of_any_color, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(origin_is_the_median, folder_make, folder_remove),
         cmocka_unit_test(extent_is_positive),
-        cmocka_unit_test_setup_teardown(no_memory, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(no_memory, folder_make, folder_remove),
         cmocka_unit_test(resize_is_the_area_mean),
-        cmocka_unit_test_setup_teardown(photos, make_temporary, remove_temporary),
-        cmocka_unit_test_setup_teardown(photo_alpha_and_nan, make_temporary, remove_temporary),
+        cmocka_unit_test_setup_teardown(photos, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(photo_alpha_and_nan, folder_make, folder_remove),
         cmocka_unit_test(fox_twice),
     };
     static struct CMUnitTest real[REAL_COUNT];

@@ -10,7 +10,7 @@
 static void write_noise(const char *name, int width, int height, uint64_t seed)
 {
     image im = noise(width, height, 3, seed);
-    assert_ok(image_write(in_folder(name), &im, NULL));
+    assert_ok(image_write(in_folder("%s", name), &im, NULL));
     image_free(&im);
 }
 
@@ -112,22 +112,14 @@ static void what_cannot_be_compared(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_comparison c;
         gbt_error err = {0};
-        assert_int_equal(gbt_compare_images(in_folder(cases[i].a), in_folder(cases[i].b), NULL, &c, &err),
-                         cases[i].status);
+        assert_int_equal(
+            gbt_compare_images(in_folder("%s", cases[i].a), in_folder("%s", cases[i].b), NULL, &c, &err),
+            cases[i].status);
         assert_non_null(strstr(err.text, cases[i].says));
     }
     gbt_comparison c;
     assert_ok(gbt_compare_images(in_folder("small.png"), in_folder("small.png"), NULL, &c, NULL));
     assert_true(c.ssim == 1 && isnan(c.ssim_interior)); /* no window fits */
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"a.png", "b.exr", "with.png", "without.png", "small.png", "wide.png"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        remove(in_folder(names[i]));
-    return rmdir(folder);
 }
 
 int main(void)
@@ -138,7 +130,5 @@ int main(void)
         cmocka_unit_test(alpha_is_left_out),
         cmocka_unit_test(what_cannot_be_compared),
     };
-    if (mkdtemp(folder) == NULL)
-        return 1;
-    return cmocka_run_group_tests(tests, NULL, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

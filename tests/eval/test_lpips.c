@@ -12,8 +12,8 @@
 static lpips *open_network(const network *n, const char *name)
 {
     lpips *net;
-    write_network(n, in_folder(name), NULL);
-    assert_ok(lpips_open(in_folder(name), &net, NULL));
+    write_network(n, in_folder("%s", name), NULL);
+    assert_ok(lpips_open(in_folder("%s", name), &net, NULL));
     assert_string_equal(lpips_network(net), n->name);
     return net;
 }
@@ -262,27 +262,11 @@ static void refusals(void **state)
     free_network(&alex);
 }
 
-static int open_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) == NULL;
-}
-
-static int close_folder(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"net.safetensors", "alex.safetensors", "a.safetensors", "a.png",
-                                        "b.png"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        unlink(in_folder(names[i]));
-    return rmdir(folder);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(vgg_agrees),     cmocka_unit_test(alex_agrees), cmocka_unit_test(halves_and_masks),
         cmocka_unit_test(files_compared), cmocka_unit_test(refusals),
     };
-    return cmocka_run_group_tests(tests, open_folder, close_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

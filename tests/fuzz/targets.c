@@ -9,7 +9,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include "base/image.h"
 #include "base/image_header.h"
@@ -20,10 +22,11 @@
 #include "data/gaussian_ply.h"
 #include "data/mesh_file.h"
 #include "data/ply.h"
+#include "data/sound.h"
 #include "data/transforms.h"
+#include "gbtrace/progress.h"
 #include "io/model_file.h"
 #include "io/safetensors.h"
-#include "quiet.h"
 #include "render/camera_file.h"
 #include "render/camera_path_file.h"
 #include "train/config.h"
@@ -31,11 +34,46 @@
 
 static const double world[3] = {0, 0, 0};
 
-/* A failure says why, and nothing else does. */
+size_t fuzz_accepted;
+
+static void require(bool holds)
+{
+    if (!holds)
+        abort();
+}
+
+/* A failure says why, in one line, and nothing else does. */
 static void check(gbt_status status, const gbt_error *err)
 {
-    if ((status == GBT_OK) != (err->text[0] == '\0'))
-        abort();
+    require((status == GBT_OK) == (err->text[0] == '\0') && err->status == status &&
+            strchr(err->text, '\n') == NULL);
+    fuzz_accepted += status == GBT_OK;
+}
+
+/* Of exactly its size, for tools that watch memory. */
+static unsigned char *copy_of(const unsigned char *bytes, size_t size)
+{
+    unsigned char *copy = malloc(size > 0 ? size : 1);
+    require(copy != NULL);
+    if (size > 0)
+        memcpy(copy, bytes, size);
+    return copy;
+}
+
+/* With a zero behind it, as file_read() leaves it. */
+static char *text_of(const source_file *file)
+{
+    char *text = calloc(file->size + 1, 1);
+    require(text != NULL);
+    if (file->size > 0)
+        memcpy(text, file->bytes, file->size);
+    return text;
+}
+
+static void check_raw(gbt_status status, const raw_scene *raw, const gbt_error *err)
+{
+    check(status, err);
+    require(status != GBT_OK || raw_is_sound(raw));
 }
 
 /* Three files in one input: each but the last ends at the bytes ----. */
@@ -47,7 +85,7 @@ static void take_three(const source_file *file, source_file out[3])
         const unsigned char *end =
             i < 2 ? memmem(file->bytes + at, file->size - at, mark, sizeof mark) : NULL;
         const size_t size = end != NULL ? (size_t)(end - file->bytes) - at : file->size - at;
-        out[i] = (source_file){.name = file->name, .bytes = file->bytes + at, .size = size};
+        out[i] = (source_file){.name = file->name, .bytes = copy_of(file->bytes + at, size), .size = size};
         at += size + (end != NULL ? sizeof mark : 0);
     }
 }
@@ -59,9 +97,13 @@ static void colmap(const source_file *file,
     raw_scene raw = {0};
     gbt_error err = {0};
     take_three(file, parts);
-    check(read(&(colmap_files){.cameras = parts[0], .images = parts[1], .points = parts[2]}, &raw, &err),
-          &err);
+    const gbt_status status =
+        read(&(colmap_files){.cameras = parts[0], .images = parts[1], .points = parts[2]}, &raw, &err);
+    check_raw(status, &raw, &err);
+    require(status == GBT_OK || status == GBT_ERR_FORMAT);
     raw_free(&raw);
+    for (int i = 0; i < 3; i++)
+        free((void *)(uintptr_t)parts[i].bytes);
 }
 
 void fuzz_colmap_bin(const source_file *file) { colmap(file, colmap_bin_read); }
@@ -73,7 +115,7 @@ void fuzz_transforms(const source_file *file)
     raw_scene raw = {0};
     char *points = NULL;
     gbt_error err = {0};
-    check(transforms_read(file, "/nowhere", false, &raw, &points, &err), &err);
+    check_raw(transforms_read(file, FUZZ_PHOTOS, false, &raw, &points, &err), &raw, &err);
     mem_free(points);
     raw_free(&raw);
 }
@@ -82,7 +124,9 @@ void fuzz_ply_points(const source_file *file)
 {
     raw_scene raw = {0};
     gbt_error err = {0};
-    check(ply_read_points(file, &raw, &err), &err);
+    const gbt_status status = ply_read_points(file, &raw, &err);
+    check_raw(status, &raw, &err);
+    require(status == GBT_OK || status == GBT_ERR_FORMAT);
     raw_free(&raw);
 }
 
@@ -93,15 +137,31 @@ static void gaussians_of(const source_file *file,
     gbt_error err = {0};
     const gbt_status status = read(file, &cloud, &err);
     check(status, &err);
-    if (status == GBT_OK)
-        gaussian_cloud_free(&cloud);
+    require(status != GBT_OK || cloud_is_sound(&cloud));
+    gaussian_cloud_free(&cloud);
 }
 
 void fuzz_ply_gaussians(const source_file *file) { gaussians_of(file, gaussian_ply_read); }
 
 void fuzz_splat(const source_file *file) { gaussians_of(file, gaussian_format_splat.read); }
 
-void fuzz_spz(const source_file *file) { gaussians_of(file, gaussian_format_spz.read); }
+/* As it is, and as what was zipped: else its checksum would hide what is behind it. */
+void fuzz_spz(const source_file *file)
+{
+    gaussians_of(file, gaussian_format_spz.read);
+    z_stream z = {.next_in = (void *)(uintptr_t)file->bytes, .avail_in = (uInt)file->size};
+    require(deflateInit2(&z, 1, Z_DEFLATED, 16 + 9, 1, Z_DEFAULT_STRATEGY) == Z_OK);
+    const uLong room = deflateBound(&z, z.avail_in);
+    unsigned char *zipped = malloc(room);
+    require(zipped != NULL);
+    z.next_out = zipped;
+    z.avail_out = (uInt)room;
+    require(deflate(&z, Z_FINISH) == Z_STREAM_END);
+    gaussians_of(&(source_file){.name = file->name, .bytes = zipped, .size = z.total_out},
+                 gaussian_format_spz.read);
+    deflateEnd(&z);
+    free(zipped);
+}
 
 void fuzz_sog(const source_file *file) { gaussians_of(file, gaussian_format_sog.read); }
 
@@ -140,7 +200,12 @@ void fuzz_mesh(const source_file *file)
 {
     mesh_data mesh = {0};
     gbt_error err = {0};
-    check(mesh_file_parse(file, &mesh, &err), &err);
+    const gbt_status status = mesh_file_parse(file, &mesh, &err);
+    check(status, &err);
+    require(status == GBT_OK || status == GBT_ERR_FORMAT);
+    for (size_t i = 0; status == GBT_OK && i < 3 * mesh.triangle_count; i++)
+        require(mesh.triangles[i] < mesh.vertex_count &&
+                fabs(mesh.position[3 * mesh.triangles[i]]) <= RAW_COORDINATE_LIMIT);
     mesh_data_free(&mesh);
 }
 
@@ -149,25 +214,29 @@ void fuzz_config(const source_file *file)
     static config_strings strings;
     gbt_train_def def = gbt_train_def_default();
     gbt_error err = {0};
-    check(config_parse((const char *)file->bytes, file->name, &def, &strings, &err), &err);
+    char *text = text_of(file);
+    check(config_parse(text, file->name, &def, &strings, &err), &err);
+    free(text);
 }
 
 void fuzz_camera(const source_file *file)
 {
     ray_shot shot;
     gbt_error err = {0};
-    check(camera_text_read((const char *)file->bytes, file->name, world, &shot, &err), &err);
+    char *text = text_of(file);
+    check(camera_text_read(text, file->name, world, &shot, &err), &err);
+    free(text);
 }
 
-/* For those that take the name of a file: a file of our own with these bytes. */
+/* For those that take the name of a file: one in memory, with these bytes. */
 static const char *as_file(const source_file *file)
 {
     static char path[64];
-    if (path[0] == '\0')
-        snprintf(path, sizeof path, "/tmp/gbt_fuzz_%ld", (long)getpid());
-    FILE *out = fopen(path, "wb"); /* never to the disk: file_write_atomic() would wait for it each time */
-    if (out == NULL || fwrite(file->bytes, 1, file->size, out) != file->size || fclose(out) != 0)
-        abort();
+    static int fd = -1;
+    if (fd < 0)
+        fd = memfd_create("input", 0);
+    snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+    require(ftruncate(fd, 0) == 0 && pwrite(fd, file->bytes, file->size, 0) == (ssize_t)file->size);
     return path;
 }
 
@@ -178,7 +247,6 @@ void fuzz_path(const source_file *file)
     gbt_error err = {0};
     check(camera_path_file_read(path, world, 0, &out, &err), &err);
     camera_path_free(&out);
-    unlink(path);
 }
 
 void fuzz_photo(const source_file *file)
@@ -193,11 +261,9 @@ void fuzz_photo(const source_file *file)
                                   : image_read(path, &out, &second);
     check(header, &err);
     if (status == GBT_OK) {
-        if (header != GBT_OK || out.width != h.width || out.height != h.height)
-            abort();
+        require(header == GBT_OK && out.width == h.width && out.height == h.height);
         image_free(&out);
     }
-    unlink(path);
 }
 
 /* ---- a request: its path, then words NAME=VALUE, each on a line ---- */
@@ -219,28 +285,29 @@ static const char *word_of(void *query, const char *name)
 
 void fuzz_request(const source_file *file)
 {
-    char text[1 << 12];
+    char *text = text_of(file);
     request out;
     gbt_error err = {0};
-    snprintf(text, sizeof text, "%s", (const char *)file->bytes);
     char *words = text + strcspn(text, "\n");
     if (*words != '\0')
         *words++ = '\0';
     check(request_parse(text, word_of, words, &out, &err), &err);
+    free(text);
+}
+
+static void hear_nothing(const gbt_event *event, void *context)
+{
+    (void)event;
+    (void)context;
 }
 
 void fuzz_one(fuzz_target *target, const unsigned char *bytes, size_t size)
 {
-    unsigned char *copy = mem_alloc(size + 1, 1, "input", NULL);
-    if (copy == NULL)
-        return;
-    if (size > 0)
-        memcpy(copy, bytes, size);
-    copy[size] = '\0'; /* as file_read() leaves it */
+    unsigned char *copy = copy_of(bytes, size);
     const source_file file = {.name = "input", .bytes = copy, .size = size};
-    be_quiet();
+    gbt_listen(hear_nothing, NULL);
     target(&file);
-    mem_free(copy);
+    free(copy);
 }
 
 #ifdef FUZZ_TARGET

@@ -1,43 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/image/test_image_io.c -- image files in and out: values, channels, refusals. Files are built by hand,
    byte by byte. */
-#include "test_support.h"
+#include "folder.h"
 
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include "base/file.h"
 #include "base/image.h"
 #include "base/image_header.h"
-#include "base/memory.h"
 #include "base/paged.h"
 #include "exr_file.h"
-
-static char folder[] = "/tmp/gbt_image_XXXXXX";
-
-static const char *at(const char *name)
-{
-    static char path[256];
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) == NULL;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    char command[256];
-    snprintf(command, sizeof command, "rm -rf '%s'", folder);
-    return system(command);
-}
 
 typedef struct buffer {
     unsigned char bytes[8192];
@@ -106,7 +80,7 @@ static buffer make_png(uint32_t width, uint32_t height, int bits, int type, cons
 
 static void save(const char *name, const buffer *b)
 {
-    assert_ok(file_write_atomic(at(name), b->bytes, b->count, &assert_ok_err_));
+    assert_ok(file_write_atomic(in_folder("%s", name), b->bytes, b->count, &assert_ok_err_));
 }
 
 typedef struct png_case {
@@ -163,7 +137,7 @@ static void reads_png(void **state)
     const buffer b = make_png((uint32_t)c->width, 1, c->bits, c->type, c->row, c->row_bytes);
     save("a.jpg", &b); /* the wrong name on purpose */
     image im;
-    assert_ok(image_read(at("a.jpg"), &im, &assert_ok_err_));
+    assert_ok(image_read(in_folder("a.jpg"), &im, &assert_ok_err_));
     assert_int_equal(im.width, c->width);
     assert_int_equal(im.height, 1);
     assert_int_equal(im.channels, c->channels);
@@ -173,7 +147,7 @@ static void reads_png(void **state)
                      (double)c->pixels[i]);
     image_free(&im);
     image_header header;
-    assert_ok(image_header_read(at("a.jpg"), &header, &assert_ok_err_));
+    assert_ok(image_header_read(in_folder("a.jpg"), &header, &assert_ok_err_));
     assert_int_equal(header.width, c->width);
     assert_int_equal(header.height, 1);
     assert_int_equal(header.has_alpha, c->channels == 4);
@@ -198,23 +172,23 @@ static void refuses_what_is_not_an_image(void **state)
     (void)state;
     image_header header = {.width = 7};
     gbt_error err = {0};
-    expect_failure(at("nothing.png"), GBT_ERR_IO, "cannot open");
-    assert_int_equal(image_header_read(at("nothing.png"), &header, &err), GBT_ERR_IO);
+    expect_failure(in_folder("nothing.png"), GBT_ERR_IO, "cannot open");
+    assert_int_equal(image_header_read(in_folder("nothing.png"), &header, &err), GBT_ERR_IO);
     assert_int_equal(header.width, 0);
-    expect_failure(folder, GBT_ERR_IO, "not a regular file");
-    assert_int_equal(mkfifo(at("fifo.png"), 0600), 0);
-    expect_failure(at("fifo.png"), GBT_ERR_IO, "not a regular file");
+    expect_failure(test_folder, GBT_ERR_IO, "not a regular file");
+    assert_int_equal(mkfifo(in_folder("fifo.png"), 0600), 0);
+    expect_failure(in_folder("fifo.png"), GBT_ERR_IO, "not a regular file");
     err = (gbt_error){0};
-    assert_int_equal(image_header_read(at("fifo.png"), &header, &err), GBT_ERR_IO);
+    assert_int_equal(image_header_read(in_folder("fifo.png"), &header, &err), GBT_ERR_IO);
     static const char *const contents[] = {
         "", "\x89PNG", "<html>404</html>", "GIF89a\1\0\1\0\0\0\0;", "P6 1 1 255 aaa", "\xff\xd8"};
     for (size_t i = 0; i < sizeof contents / sizeof *contents; i++) {
         buffer b = {.count = 0};
         put(&b, contents[i], strlen(contents[i]));
         save("b.png", &b);
-        expect_failure(at("b.png"), GBT_ERR_FORMAT, "not a PNG, JPEG or EXR file");
+        expect_failure(in_folder("b.png"), GBT_ERR_FORMAT, "not a PNG, JPEG or EXR file");
         err = (gbt_error){0};
-        assert_int_equal(image_header_read(at("b.png"), &header, &err), GBT_ERR_FORMAT);
+        assert_int_equal(image_header_read(in_folder("b.png"), &header, &err), GBT_ERR_FORMAT);
     }
 }
 
@@ -234,7 +208,7 @@ static void refuses_bombs(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const buffer b = make_png(cases[i].width, cases[i].height, 8, 2, "abc", 3);
         save("bomb.png", &b);
-        expect_failure(at("bomb.png"), GBT_ERR_FORMAT, cases[i].text);
+        expect_failure(in_folder("bomb.png"), GBT_ERR_FORMAT, cases[i].text);
     }
 }
 
@@ -247,19 +221,19 @@ static void refuses_damaged_png(void **state)
         buffer b = whole;
         b.count = count;
         save("cut.png", &b);
-        expect_failure(at("cut.png"), GBT_ERR_FORMAT, "");
+        expect_failure(in_folder("cut.png"), GBT_ERR_FORMAT, "");
     }
     for (size_t i = 8; i < whole.count; i++) {
         buffer b = whole;
         b.bytes[i] ^= 0x10;
         save("flip.png", &b);
-        expect_failure(at("flip.png"), GBT_ERR_FORMAT, "");
+        expect_failure(in_folder("flip.png"), GBT_ERR_FORMAT, "");
     }
     buffer trailing = whole;
     put(&trailing, "rubbish", 7); /* allowed: the image is whole */
     save("trailing.png", &trailing);
     image im;
-    assert_ok(image_read(at("trailing.png"), &im, &assert_ok_err_));
+    assert_ok(image_read(in_folder("trailing.png"), &im, &assert_ok_err_));
     image_free(&im);
 }
 
@@ -284,8 +258,8 @@ static void jpeg_round_trip_and_truncation(void **state)
     mem_free(bytes);
     assert_ok(image_encode_jpeg(&im, 95, &bytes, &count, &assert_ok_err_));
     assert_true(rough_count < count);
-    assert_ok(file_write_atomic(at("c.png"), bytes, count, &assert_ok_err_));
-    assert_ok(image_read(at("c.png"), &back, &assert_ok_err_));
+    assert_ok(file_write_atomic(in_folder("c.png"), bytes, count, &assert_ok_err_));
+    assert_ok(image_read(in_folder("c.png"), &back, &assert_ok_err_));
     assert_int_equal(back.width, 64);
     assert_int_equal(back.height, 48);
     assert_int_equal(back.channels, 3);
@@ -293,8 +267,8 @@ static void jpeg_round_trip_and_truncation(void **state)
         assert_float_equal(back.pixels[i], im.pixels[i], 4.0 / 255);
     image_free(&back);
     for (size_t cut = 3; cut + 2 <= count; cut += 1 + count / 97) {
-        assert_ok(file_write_atomic(at("cut.jpg"), bytes, cut, &assert_ok_err_));
-        expect_failure(at("cut.jpg"), GBT_ERR_FORMAT, "");
+        assert_ok(file_write_atomic(in_folder("cut.jpg"), bytes, cut, &assert_ok_err_));
+        expect_failure(in_folder("cut.jpg"), GBT_ERR_FORMAT, "");
     }
     mem_free(bytes);
     gbt_error err = {0};
@@ -305,9 +279,9 @@ static void jpeg_round_trip_and_truncation(void **state)
     image_free(&im);
     im = make_gradient(8, 8, 1);
     assert_ok(image_encode_jpeg(&im, 100, &bytes, &count, &assert_ok_err_));
-    assert_ok(file_write_atomic(at("grey.jpg"), bytes, count, &assert_ok_err_));
+    assert_ok(file_write_atomic(in_folder("grey.jpg"), bytes, count, &assert_ok_err_));
     mem_free(bytes);
-    assert_ok(image_read(at("grey.jpg"), &back, &assert_ok_err_));
+    assert_ok(image_read(in_folder("grey.jpg"), &back, &assert_ok_err_));
     assert_int_equal(back.channels, 3);
     assert_true(back.pixels[30] == back.pixels[31] && back.pixels[30] == back.pixels[32]);
     image_free(&back);
@@ -323,8 +297,8 @@ static void png_rounds_half_up_and_clamps(void **state)
     image im, back;
     assert_ok(image_alloc(&im, 2, 2, 3, &assert_ok_err_));
     memcpy(im.pixels, values, sizeof values);
-    assert_ok(image_write(at("d.PNG"), &im, &assert_ok_err_));
-    assert_ok(image_read(at("d.PNG"), &back, &assert_ok_err_));
+    assert_ok(image_write(in_folder("d.PNG"), &im, &assert_ok_err_));
+    assert_ok(image_read(in_folder("d.PNG"), &back, &assert_ok_err_));
     assert_int_equal(back.channels, 3);
     for (int i = 0; i < 12; i++)
         if (back.pixels[i] != (float)levels[i] / 255.0f)
@@ -332,7 +306,7 @@ static void png_rounds_half_up_and_clamps(void **state)
     unsigned char *bytes, *file;
     size_t count, file_count;
     assert_ok(image_encode_png(&im, &bytes, &count, &assert_ok_err_));
-    assert_ok(file_read(at("d.PNG"), &file, &file_count, &assert_ok_err_));
+    assert_ok(file_read(in_folder("d.PNG"), &file, &file_count, &assert_ok_err_));
     assert_int_equal(count, file_count);
     assert_memory_equal(bytes, file, count);
     mem_free(bytes);
@@ -346,8 +320,8 @@ static void png_keeps_every_level_and_channel_count(void **state)
     (void)state;
     for (int channels = 1; channels <= 4; channels++) {
         image im = make_gradient(16, 16, channels), back;
-        assert_ok(image_write(at("e.png"), &im, &assert_ok_err_));
-        assert_ok(image_read(at("e.png"), &back, &assert_ok_err_));
+        assert_ok(image_write(in_folder("e.png"), &im, &assert_ok_err_));
+        assert_ok(image_read(in_folder("e.png"), &back, &assert_ok_err_));
         assert_int_equal(back.channels, channels <= 2 ? channels + 2 : channels);
         for (int i = 0; i < 256; i++)
             for (int c = 0; c < back.channels; c++) {
@@ -369,8 +343,8 @@ static void exr_round_trip_is_exact(void **state)
     im.pixels[300] = NAN;
     im.pixels[301] = INFINITY;
     im.pixels[302] = -INFINITY;
-    assert_ok(image_write(at("f.exr"), &im, &assert_ok_err_));
-    assert_ok(image_read(at("f.exr"), &back, &assert_ok_err_));
+    assert_ok(image_write(in_folder("f.exr"), &im, &assert_ok_err_));
+    assert_ok(image_read(in_folder("f.exr"), &back, &assert_ok_err_));
     assert_int_equal(back.width, 37);
     assert_int_equal(back.height, 23);
     assert_int_equal(back.channels, 3);
@@ -379,14 +353,14 @@ static void exr_round_trip_is_exact(void **state)
     assert_memory_equal(back.pixels, im.pixels, 37 * 23 * 3 * sizeof(float));
     image_free(&back);
     image_header header;
-    assert_ok(image_header_read(at("f.exr"), &header, &assert_ok_err_));
+    assert_ok(image_header_read(in_folder("f.exr"), &header, &assert_ok_err_));
     assert_true(header.width == 37 && header.height == 23 && !header.has_alpha);
     unsigned char *bytes;
     size_t count;
-    assert_ok(file_read(at("f.exr"), &bytes, &count, &assert_ok_err_));
+    assert_ok(file_read(in_folder("f.exr"), &bytes, &count, &assert_ok_err_));
     for (size_t cut = 4; cut < count; cut += 1 + count / 61) {
-        assert_ok(file_write_atomic(at("cut.exr"), bytes, cut, &assert_ok_err_));
-        expect_failure(at("cut.exr"), GBT_ERR_FORMAT, "");
+        assert_ok(file_write_atomic(in_folder("cut.exr"), bytes, cut, &assert_ok_err_));
+        expect_failure(in_folder("cut.exr"), GBT_ERR_FORMAT, "");
     }
     mem_free(bytes);
     image_free(&im);
@@ -441,7 +415,7 @@ static void exr_half_with_extra_channels(void **state)
     put(&b, (uint16_t[8]){0x3C00, 0x7E00, 0xC000, 0x7C00, 0x3800, 0xFC00, 0x3C00, 0x3C00}, 16);
     save("half.exr", &b);
     image im;
-    assert_ok(image_read(at("half.exr"), &im, &assert_ok_err_));
+    assert_ok(image_read(in_folder("half.exr"), &im, &assert_ok_err_));
     assert_int_equal(im.width, 2);
     assert_int_equal(im.channels, 3); /* the depth is left out */
     const float wanted[6] = {0.5f, -2.0f, 1.0f, 0.0f, 0.0f, 0.0f};
@@ -465,11 +439,11 @@ static void exr_channels_are_found_by_name(void **state)
                 {{"b", "g", "r"}, 3, 3, {3, 2, 1}},
                 {{"B", "G", "R", "ViewLayer.A"}, 4, 3, {3, 2, 1}}};
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
-        exr_write(at("names.exr"), 1, 1, rows[r].count, rows[r].names, 2, seven);
+        exr_write(in_folder("names.exr"), 1, 1, rows[r].count, rows[r].names, 2, seven);
         image im;
         image_header header;
-        assert_ok(image_read(at("names.exr"), &im, &assert_ok_err_));
-        assert_ok(image_header_read(at("names.exr"), &header, &assert_ok_err_));
+        assert_ok(image_read(in_folder("names.exr"), &im, &assert_ok_err_));
+        assert_ok(image_header_read(in_folder("names.exr"), &header, &assert_ok_err_));
         assert_int_equal(im.channels, rows[r].channels);
         assert_true(header.has_colors);
         assert_int_equal(header.has_alpha, im.channels == 4);
@@ -487,19 +461,19 @@ static void refuses_exr_of_layers(void **state)
         "ViewLayer.AO.B",       "ViewLayer.AO.G",       "ViewLayer.AO.R",      "ViewLayer.Combined.A",
         "ViewLayer.Combined.B", "ViewLayer.Combined.G", "ViewLayer.Combined.R"};
     static const char *const place[3] = {"X", "Y", "Z"};
-    exr_write(at("layers.exr"), 1, 1, 7, names, 2, seven);
-    expect_failure(at("layers.exr"), GBT_ERR_FORMAT, "EXR has no channels R, G and B");
+    exr_write(in_folder("layers.exr"), 1, 1, 7, names, 2, seven);
+    expect_failure(in_folder("layers.exr"), GBT_ERR_FORMAT, "EXR has no channels R, G and B");
     image_header header;
-    assert_ok(image_header_read(at("layers.exr"), &header, &assert_ok_err_));
+    assert_ok(image_header_read(in_folder("layers.exr"), &header, &assert_ok_err_));
     assert_false(header.has_colors);
     image im;
     static image_names found;
-    assert_ok(image_read_raw(at("layers.exr"), &im, &found, &assert_ok_err_));
+    assert_ok(image_read_raw(in_folder("layers.exr"), &im, &found, &assert_ok_err_));
     assert_int_equal(im.channels, 7);
     assert_string_equal(found.name[0], "ViewLayer.AO.R");
     image_free(&im);
-    exr_write(at("place.exr"), 1, 1, 3, place, 2, seven);
-    expect_failure(at("place.exr"), GBT_ERR_FORMAT, "EXR has no channels R, G and B");
+    exr_write(in_folder("place.exr"), 1, 1, 3, place, 2, seven);
+    expect_failure(in_folder("place.exr"), GBT_ERR_FORMAT, "EXR has no channels R, G and B");
 }
 
 static void refuses_cropped_exr(void **state)
@@ -507,20 +481,20 @@ static void refuses_cropped_exr(void **state)
     (void)state;
     static const char *const names[3] = {"B", "G", "R"};
     static const char start[] = "displayWindow\0box2i\0....";
-    exr_write(at("cropped.exr"), 2, 1, 3, names, 2, seven);
+    exr_write(in_folder("cropped.exr"), 2, 1, 3, names, 2, seven);
     unsigned char *bytes;
     size_t count;
-    assert_ok(file_read(at("cropped.exr"), &bytes, &count, &assert_ok_err_));
+    assert_ok(file_read(in_folder("cropped.exr"), &bytes, &count, &assert_ok_err_));
     unsigned char *window = memmem(bytes, count, start, 20);
     assert_non_null(window);
     window[sizeof start - 1 + 8]++; /* its last column */
-    assert_ok(file_write_atomic(at("cropped.exr"), bytes, count, &assert_ok_err_));
+    assert_ok(file_write_atomic(in_folder("cropped.exr"), bytes, count, &assert_ok_err_));
     mem_free(bytes);
     image_header header;
     gbt_error err = {0};
-    assert_int_equal(image_header_read(at("cropped.exr"), &header, &err), GBT_ERR_FORMAT);
+    assert_int_equal(image_header_read(in_folder("cropped.exr"), &header, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "its data window is not its display window"));
-    expect_failure(at("cropped.exr"), GBT_ERR_FORMAT, "EXR is cropped");
+    expect_failure(in_folder("cropped.exr"), GBT_ERR_FORMAT, "EXR is cropped");
 }
 
 static void refuses_multipart_and_deep_exr(void **state)
@@ -538,7 +512,7 @@ static void refuses_multipart_and_deep_exr(void **state)
         put(&b, (uint16_t[3]){0x3C00, 0x3C00, 0x3C00}, 6);
     }
     save("parts.exr", &b);
-    expect_failure(at("parts.exr"), GBT_ERR_FORMAT, "multi-part");
+    expect_failure(in_folder("parts.exr"), GBT_ERR_FORMAT, "multi-part");
 
     b.count = 0;
     put(&b, "\x76\x2f\x31\x01\2\x08\0\0", 8);
@@ -550,7 +524,7 @@ static void refuses_multipart_and_deep_exr(void **state)
     put(&b, (int32_t[1]){1}, 4);
     put(&b, (uint16_t[3]){0x3C00, 0x3C00, 0x3C00}, 6);
     save("deep.exr", &b);
-    expect_failure(at("deep.exr"), GBT_ERR_FORMAT, "deep");
+    expect_failure(in_folder("deep.exr"), GBT_ERR_FORMAT, "deep");
 }
 
 static void write_refusals(void **state)
@@ -558,14 +532,14 @@ static void write_refusals(void **state)
     (void)state;
     image im = make_gradient(4, 4, 3);
     gbt_error err = {0};
-    assert_int_equal(image_write(at("g.tif"), &im, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(image_write(in_folder("g.tif"), &im, &err), GBT_ERR_ARGUMENT);
     err = (gbt_error){0};
-    assert_int_equal(image_write(at("no/such/folder.png"), &im, &err), GBT_ERR_IO);
+    assert_int_equal(image_write(in_folder("no/such/folder.png"), &im, &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "no/such/folder.png"));
     image empty = {0};
     err = (gbt_error){0};
-    assert_int_equal(image_write(at("g.png"), &empty, &err), GBT_ERR_ARGUMENT);
-    assert_false(file_exists(at("g.png")));
+    assert_int_equal(image_write(in_folder("g.png"), &empty, &err), GBT_ERR_ARGUMENT);
+    assert_false(file_exists(in_folder("g.png")));
     image_free(&im);
 }
 
@@ -579,7 +553,7 @@ static void no_memory(void **state)
         image im = {0};
         gbt_error err = {0};
         mem_fail_after(n);
-        const gbt_status status = image_read(at("h.png"), &im, &err);
+        const gbt_status status = image_read(in_folder("h.png"), &im, &err);
         mem_fail_after(-1);
         if (status == GBT_OK) {
             assert_true(n >= 2); /* the file and the pixels */
@@ -604,10 +578,10 @@ static void asks_for_memory_without_a_file(void **state)
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &keep), 0);
     tight = keep;
     tight.rlim_cur = 1 << 20;
-    assert_ok(paged_start(folder, (size_t)1 << 40, NULL));
+    assert_ok(paged_start(test_folder, (size_t)1 << 40, NULL));
     void (*const handler)(int) = signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
-    const gbt_status status = image_read(at("h.png"), &im, &err);
+    const gbt_status status = image_read(in_folder("h.png"), &im, &err);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &keep), 0);
     signal(SIGXFSZ, handler);
     paged_stop();
@@ -668,5 +642,5 @@ int main(void)
     };
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         tests[count++] = others[i];
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

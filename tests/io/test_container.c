@@ -3,10 +3,8 @@
 #include <fcntl.h>
 #include <sys/mount.h>
 
-#include "base/file.h"
-#include "base/memory.h"
+#include "folder.h"
 #include "io/container.h"
-#include "io_support.h"
 
 static const float floats[6] = {1.5f, -2.0f, 0.0f, 1e-30f, 3e30f, -0.0f};
 static const double doubles[2] = {1e300, -1.0 / 3.0};
@@ -90,9 +88,9 @@ static void round_trip_on_disk(void **state)
     (void)state;
     container_writer w = {0};
     fill(&w);
-    assert_ok(container_save(&w, test_path("a.gbt"), NULL));
+    assert_ok(container_save(&w, in_folder("a.gbt"), NULL));
     container c;
-    assert_ok(container_load(test_path("a.gbt"), &c, NULL));
+    assert_ok(container_load(in_folder("a.gbt"), &c, NULL));
     check_contents(&c);
     container_free(&c);
     container_writer_free(&w);
@@ -447,10 +445,10 @@ static void misuse(void **state)
     container_writer w = {0};
     row->add(&w);
     gbt_error err = {0};
-    assert_int_equal(container_save(&w, test_path("misuse.gbt"), &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(container_save(&w, in_folder("misuse.gbt"), &err), GBT_ERR_ARGUMENT);
     if (strstr(err.text, row->message) == NULL)
         fail_msg("\"%s\" is not \"%s\"", err.text, row->message);
-    assert_false(file_exists(test_path("misuse.gbt")));
+    assert_false(file_exists(in_folder("misuse.gbt")));
     container_writer_free(&w);
 }
 
@@ -466,9 +464,9 @@ static void no_memory(void **state)
         gbt_error err = {0};
         mem_fail_after(n);
         fill(&w);
-        gbt_status status = container_save(&w, test_path("memory.gbt"), &err);
+        gbt_status status = container_save(&w, in_folder("memory.gbt"), &err);
         if (status == GBT_OK)
-            status = container_load(test_path("memory.gbt"), &c, &err);
+            status = container_load(in_folder("memory.gbt"), &c, &err);
         mem_fail_after(-1);
         worked = status == GBT_OK;
         if (!worked) {
@@ -508,8 +506,7 @@ static void unwritable_places(void **state)
 static void unreadable_files(void **state)
 {
     (void)state;
-    char fifo[512];
-    snprintf(fifo, sizeof fifo, "%s", test_path("fifo"));
+    const char *fifo = in_folder("fifo");
     assert_int_equal(mkfifo(fifo, 0600), 0);
     const char *paths[] = {"/nonexistent", test_folder, fifo, "/dev/zero"};
     for (size_t i = 0; i < sizeof paths / sizeof *paths; i++) {
@@ -590,5 +587,5 @@ int main(void)
         tests[count] = (struct CMUnitTest){
             .name = names[FORGED + i], .test_func = misuse, .initial_state = &misuse_cases[i]};
     }
-    return _cmocka_run_group_tests("container", tests, count, make_test_folder, remove_test_folder);
+    return _cmocka_run_group_tests("container", tests, count, folder_make, folder_remove);
 }

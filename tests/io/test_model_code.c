@@ -4,15 +4,13 @@
 #include <math.h>
 
 #include "anchor/decode.h"
-#include "base/file.h"
 #include "base/hash.h"
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "folder.h"
 #include "io/model_code.h"
 #include "io/model_file.h"
 #include "io/model_steps.h"
-#include "io_support.h"
 
 /* Values in [-1, 1) times `scale`: no function of the C library, so that every machine makes the same. */
 static void fill(float *values, size_t count, uint64_t stream, float scale)
@@ -126,8 +124,8 @@ static void rounded_by_half_a_step(void **state)
     model_sizes sizes;
     make_model(&m, row->count, row->offset_count, row->has_distance);
     make_steps(&steps, row->count, row->with_doublings);
-    assert_ok(model_save_coded(test_path("small.gbt"), &m, &steps, &sizes, NULL));
-    assert_ok(model_load(test_path("small.gbt"), &back, NULL));
+    assert_ok(model_save_coded(in_folder("small.gbt"), &m, &steps, &sizes, NULL));
+    assert_ok(model_load(in_folder("small.gbt"), &back, NULL));
     assert_int_equal(back.anchors.count, row->count);
     assert_int_equal(back.anchors.offset_count, row->offset_count);
     assert_true((back.anchor_pixel != NULL) == row->has_distance);
@@ -155,7 +153,7 @@ static void rounded_by_half_a_step(void **state)
     assert_true(parts < sizes.total && sizes.total < parts + 3000);
     unsigned char *bytes;
     size_t byte_count;
-    assert_ok(file_read(test_path("small.gbt"), &bytes, &byte_count, NULL));
+    assert_ok(file_read(in_folder("small.gbt"), &bytes, &byte_count, NULL));
     assert_int_equal(byte_count, sizes.total);
     mem_free(bytes);
     model_steps_free(&steps);
@@ -177,8 +175,8 @@ static void large_values_get_larger_steps(void **state)
     m.anchors.feature[at[0]] = large[0];
     m.anchors.offset[at[1]] = large[1];
     m.anchors.offset[at[2]] = large[2];
-    assert_ok(model_save_coded(test_path("large.gbt"), &m, &steps, &sizes, NULL));
-    assert_ok(model_load(test_path("large.gbt"), &back, NULL));
+    assert_ok(model_save_coded(in_folder("large.gbt"), &m, &steps, &sizes, NULL));
+    assert_ok(model_load(in_folder("large.gbt"), &back, NULL));
     double apart[3] = {INFINITY, INFINITY, INFINITY}; /* anchors come in another order */
     for (size_t i = 0; i < 50; i++) {
         const float values[3] = {back.anchors.feature[i * ANCHOR_FEATURE_DIM + 5],
@@ -203,11 +201,11 @@ static void lossless_keeps_bits_and_order(void **state)
         m.anchors.offset[0] = 1e-42f;
         m.anchors.position[0] = 3e38f;
     }
-    assert_ok(model_save(test_path("plain.gbt"), &m, NULL));
-    assert_ok(model_save_coded(test_path("small.gbt"), &m, NULL, NULL, NULL));
-    assert_ok(model_load(test_path("small.gbt"), &back, NULL));
-    assert_ok(model_save(test_path("again.gbt"), &back, NULL));
-    assert_same_files("plain.gbt", "again.gbt");
+    assert_ok(model_save(in_folder("plain.gbt"), &m, NULL));
+    assert_ok(model_save_coded(in_folder("small.gbt"), &m, NULL, NULL, NULL));
+    assert_ok(model_load(in_folder("small.gbt"), &back, NULL));
+    assert_ok(model_save(in_folder("again.gbt"), &back, NULL));
+    assert_same_file(in_folder("plain.gbt"), in_folder("again.gbt"));
     model_free(&m);
     model_free(&back);
 }
@@ -235,12 +233,12 @@ static void odd_models(void **state)
             m.anchors.offset[5] = 1e30f, m.anchors.scale_log[3] = -1e20f, m.decoder.params[2] = 1e9f,
             m.anchor_pixel[1] = 1e-45f, m.anchor_pixel[2] = 3e38f;
         }
-        assert_ok(model_save_coded(test_path("small.gbt"), &m, &steps, NULL, NULL));
-        assert_ok(model_load(test_path("small.gbt"), &back, NULL));
+        assert_ok(model_save_coded(in_folder("small.gbt"), &m, &steps, NULL, NULL));
+        assert_ok(model_load(in_folder("small.gbt"), &back, NULL));
         mem_free(steps.doubling);
         steps.doubling = NULL;
-        assert_ok(model_save_coded(test_path("small.gbt"), &back, &steps, NULL, NULL));
-        assert_ok(model_load(test_path("small.gbt"), &twice, NULL));
+        assert_ok(model_save_coded(in_folder("small.gbt"), &back, &steps, NULL, NULL));
+        assert_ok(model_load(in_folder("small.gbt"), &twice, NULL));
         assert_int_equal(twice.anchors.count, 200);
         if (kind != 5)
             assert_memory_equal(back.anchors.feature, twice.anchors.feature, sizeof(float)); /* multiples of a
@@ -301,9 +299,9 @@ static void damage(void **state)
         model_steps steps;
         make_model(&m, 40, 2, true);
         make_steps(&steps, 40, true);
-        assert_ok(model_save_coded(test_path("small.gbt"), &m, lossless ? NULL : &steps, NULL, NULL));
+        assert_ok(model_save_coded(in_folder("small.gbt"), &m, lossless ? NULL : &steps, NULL, NULL));
         container c;
-        assert_ok(container_load(test_path("small.gbt"), &c, NULL));
+        assert_ok(container_load(in_folder("small.gbt"), &c, NULL));
         int refused = 0, taken = 0;
         for (uint64_t round = 0; round < 400; round++) {
             const size_t chosen = (size_t)(rng_uniform(5, 1, round) * 4);
@@ -384,8 +382,8 @@ static void forged_shapes(void **state)
         model_add_coded(&w, &coded);
         container_add_small(&w, "decoder.has_distance", CONTAINER_U8, 1, &(uint8_t){1});
         container_add_small(&w, "decoder.numbers", CONTAINER_F32, 3, (float[3]){1, 0, 1});
-        assert_ok(container_save(&w, test_path("forged.gbt"), NULL));
-        assert_int_equal(model_load(test_path("forged.gbt"), &back, &err), GBT_ERR_FORMAT);
+        assert_ok(container_save(&w, in_folder("forged.gbt"), NULL));
+        assert_int_equal(model_load(in_folder("forged.gbt"), &back, &err), GBT_ERR_FORMAT);
         if (strstr(err.text, rows[i].message) == NULL)
             fail_msg("row %d: \"%s\"", (int)i, err.text);
         container_writer_free(&w);
@@ -406,7 +404,7 @@ static void no_memory(void **state)
     for (long n = 0; n < 400 && !worked; n++) {
         gbt_error err = {0};
         mem_fail_after(n);
-        const gbt_status status = model_save_coded(test_path("small.gbt"), &m, &steps, NULL, &err);
+        const gbt_status status = model_save_coded(in_folder("small.gbt"), &m, &steps, NULL, &err);
         mem_fail_after(-1);
         worked = status == GBT_OK;
         assert_true(worked ? n > 20 : status == GBT_ERR_NO_MEMORY && err.text[0] != '\0');
@@ -563,5 +561,5 @@ int main(void)
                                 .test_func = i % 2 ? lossless_keeps_bits_and_order : rounded_by_half_a_step,
                                 .initial_state = &shape_cases[i / 2]};
     }
-    return cmocka_run_group_tests(tests, make_test_folder, remove_test_folder);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

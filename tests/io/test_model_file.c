@@ -3,11 +3,9 @@
    with its section. */
 #include <math.h>
 
-#include "base/file.h"
-#include "base/memory.h"
 #include "base/rng.h"
+#include "folder.h"
 #include "io/model_file.h"
-#include "io_support.h"
 
 static void fill_values(float *values, size_t count, uint64_t stream)
 {
@@ -95,8 +93,8 @@ static void round_trip(void **state)
     const shape_case *row = *state;
     model m, back;
     make_model(&m, row->count, row->offset_count, row->has_distance);
-    assert_ok(model_save(test_path("m.gbt"), &m, NULL));
-    assert_ok(model_load(test_path("m.gbt"), &back, NULL));
+    assert_ok(model_save(in_folder("m.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("m.gbt"), &back, NULL));
     check_same(&m, &back);
     model_free(&back);
     assert_null(back.anchors.position);
@@ -108,10 +106,10 @@ static void same_model_same_bytes(void **state)
     (void)state;
     model m, back;
     make_model(&m, 20, 10, true);
-    assert_ok(model_save(test_path("a.gbt"), &m, NULL));
-    assert_ok(model_load(test_path("a.gbt"), &back, NULL));
-    assert_ok(model_save(test_path("b.gbt"), &back, NULL));
-    assert_same_files("a.gbt", "b.gbt");
+    assert_ok(model_save(in_folder("a.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("a.gbt"), &back, NULL));
+    assert_ok(model_save(in_folder("b.gbt"), &back, NULL));
+    assert_same_file(in_folder("a.gbt"), in_folder("b.gbt"));
     model_free(&m);
     model_free(&back);
 }
@@ -163,25 +161,25 @@ static void spoiled(void **state)
     const spoil_case *row = *state;
     model m, back;
     make_model(&m, 3, 10, false);
-    assert_ok(model_save(test_path("good.gbt"), &m, NULL));
+    assert_ok(model_save(in_folder("good.gbt"), &m, NULL));
     row->spoil(&m);
     gbt_error err = {0};
-    assert_int_equal(model_save(test_path("bad.gbt"), &m, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(model_save(in_folder("bad.gbt"), &m, &err), GBT_ERR_ARGUMENT);
     if (strstr(err.text, row->message) == NULL)
         fail_msg("save: \"%s\" is not \"%s\"", err.text, row->message);
-    assert_false(file_exists(test_path("bad.gbt")));
+    assert_false(file_exists(in_folder("bad.gbt")));
     container_writer w = {0}; /* past model_save()'s check, as a forger would */
     model_add(&w, &m);
-    assert_ok(container_save(&w, test_path("bad.gbt"), NULL));
+    assert_ok(container_save(&w, in_folder("bad.gbt"), NULL));
     container_writer_free(&w);
     memset(&back, 0x55, sizeof back);
     err = (gbt_error){0};
-    assert_int_equal(model_load(test_path("bad.gbt"), &back, &err), GBT_ERR_FORMAT);
+    assert_int_equal(model_load(in_folder("bad.gbt"), &back, &err), GBT_ERR_FORMAT);
     if (strstr(err.text, row->message) == NULL || strstr(err.text, "bad.gbt: ") == NULL)
         fail_msg("load: \"%s\" is not \"%s\"", err.text, row->message);
     assert_null(back.anchors.position);
     assert_null(back.decoder.params);
-    unlink(test_path("bad.gbt"));
+    unlink(in_folder("bad.gbt"));
     model_free(&m);
 }
 
@@ -208,11 +206,11 @@ static void every_section_is_needed(void **state)
                 else if (empty == 1)
                     container_add(&w, s->name, s->dtype, 1, (size_t[]){0}, NULL);
             }
-            assert_ok(container_save(&w, test_path("part.gbt"), NULL));
+            assert_ok(container_save(&w, in_folder("part.gbt"), NULL));
             container_writer_free(&w);
             model back;
             gbt_error err = {0};
-            assert_int_equal(model_load(test_path("part.gbt"), &back, &err), GBT_ERR_FORMAT);
+            assert_int_equal(model_load(in_folder("part.gbt"), &back, &err), GBT_ERR_FORMAT);
             if (strstr(err.text, name) == NULL)
                 fail_msg("without %s: \"%s\"", name, err.text);
         }
@@ -241,11 +239,11 @@ static void shapes_that_disagree(void **state)
         container_add(&w, "anchor.offset", CONTAINER_F32, 3, (size_t[]){rows[i].offsets, rows[i].k, 3},
                       zeros);
         container_add(&w, "anchor.scale_log", CONTAINER_F32, 2, (size_t[]){rows[i].positions, 6}, zeros);
-        assert_ok(container_save(&w, test_path("odd.gbt"), NULL));
+        assert_ok(container_save(&w, in_folder("odd.gbt"), NULL));
         container_writer_free(&w);
         model back;
         gbt_error err = {0};
-        assert_int_equal(model_load(test_path("odd.gbt"), &back, &err), GBT_ERR_FORMAT);
+        assert_int_equal(model_load(in_folder("odd.gbt"), &back, &err), GBT_ERR_FORMAT);
         if (strstr(err.text, rows[i].message) == NULL)
             fail_msg("row %zu: \"%s\"", i, err.text);
     }
@@ -256,10 +254,10 @@ static void every_flipped_byte_is_found(void **state)
     (void)state;
     model m, back;
     make_model(&m, 2, 1, false);
-    assert_ok(model_save(test_path("m.gbt"), &m, NULL));
+    assert_ok(model_save(in_folder("m.gbt"), &m, NULL));
     unsigned char *bytes;
     size_t byte_count;
-    assert_ok(file_read(test_path("m.gbt"), &bytes, &byte_count, NULL));
+    assert_ok(file_read(in_folder("m.gbt"), &bytes, &byte_count, NULL));
     for (size_t i = 0; i < byte_count; i++) {
         bytes[i] ^= 0x40;
         container c;
@@ -286,10 +284,10 @@ static void no_memory(void **state)
         model back;
         gbt_error err = {0};
         mem_fail_after(n);
-        gbt_status status = model_save(test_path("memory.gbt"), &m, &err);
+        gbt_status status = model_save(in_folder("memory.gbt"), &m, &err);
         const bool saved = status == GBT_OK;
         if (saved)
-            status = model_load(test_path("memory.gbt"), &back, &err);
+            status = model_load(in_folder("memory.gbt"), &back, &err);
         mem_fail_after(-1);
         worked = status == GBT_OK;
         if (!worked) {
@@ -314,8 +312,8 @@ static void texts_up_to_their_size(void **state)
     make_model(&m, 1, 1, false);
     memset(m.config, 'c', MODEL_CONFIG_SIZE - 1);
     memset(m.data_folder, 'f', MODEL_FOLDER_SIZE - 1);
-    assert_ok(model_save(test_path("m.gbt"), &m, NULL));
-    assert_ok(model_load(test_path("m.gbt"), &back, NULL));
+    assert_ok(model_save(in_folder("m.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("m.gbt"), &back, NULL));
     check_same(&m, &back);
     model_free(&m);
     model_free(&back);
@@ -355,5 +353,5 @@ int main(void)
         tests[count++] =
             (struct CMUnitTest){.name = names[i], .test_func = spoiled, .initial_state = &spoil_cases[i]};
     }
-    return _cmocka_run_group_tests("model_file", tests, count, make_test_folder, remove_test_folder);
+    return _cmocka_run_group_tests("model_file", tests, count, folder_make, folder_remove);
 }

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/io/test_scaffold_file.c -- models of Scaffold-GS: written here by the description of the format,
    evaluated here in double by its equations, and read and decoded by ours. */
-#include "io_support.h"
+#include "folder.h"
 
 #include "anchor/decode.h"
 #include "base/rng.h"
 #include "data/bytes.h"
 #include "io/safetensors.h"
 #include "io/scaffold_file.h"
-#include "write_text.h"
 
 enum { ANCHORS = 40, OFFSETS = 10, FEATURES = 32, HIDDEN = 32, INPUTS = 35 };
 
@@ -69,7 +68,7 @@ static void draw_model(unsigned with_distance)
 static void save(sink *s, const char *name)
 {
     assert_int_equal(s->status, GBT_OK);
-    assert_ok(file_write_atomic(test_path(name), s->bytes, s->size, NULL));
+    assert_ok(file_write_atomic(in_folder("%s", name), s->bytes, s->size, NULL));
     sink_free(s);
 }
 
@@ -219,7 +218,7 @@ static void decodes_to_the_same_gaussians(void **state)
         model m;
         size_t dropped;
         gbt_error err = {0};
-        if (scaffold_file_read(test_path("point_cloud.ply"), &m, &dropped, &err) != GBT_OK)
+        if (scaffold_file_read(in_folder("point_cloud.ply"), &m, &dropped, &err) != GBT_OK)
             fail_msg("%s", err.text);
         assert_int_equal(m.anchors.count, ANCHORS);
         assert_int_equal(m.anchors.offset_count, OFFSETS);
@@ -268,7 +267,7 @@ static void refused(const char *says, gbt_status status)
     model m;
     size_t dropped;
     gbt_error err = {0};
-    assert_int_equal(scaffold_file_read(test_path("point_cloud.ply"), &m, &dropped, &err), status);
+    assert_int_equal(scaffold_file_read(in_folder("point_cloud.ply"), &m, &dropped, &err), status);
     if (strstr(err.text, says) == NULL || strchr(err.text, '\n') != NULL)
         fail_msg("wanted \"%s\", got \"%s\"", says, err.text);
     assert_null(m.anchors.position);
@@ -278,21 +277,21 @@ static void says_what_is_wrong(void **state)
 {
     (void)state;
     write_model(0);
-    unlink(test_path("cov_mlp.safetensors"));
+    unlink(in_folder("cov_mlp.safetensors"));
     refused("cov_mlp.safetensors: cannot open", GBT_ERR_IO);
-    write_text(test_path("cov_mlp.pt"), "");
+    write_text(in_folder("cov_mlp.pt"), "");
     refused("torch.jit.load(n + '_mlp.pt', 'cpu')", GBT_ERR_IO);
-    unlink(test_path("cov_mlp.pt"));
-    write_text(test_path("checkpoints.pth"), "");
+    unlink(in_folder("cov_mlp.pt"));
+    write_text(in_folder("checkpoints.pth"), "");
     refused("torch.load('checkpoints.pth', 'cpu').items()]\"", GBT_ERR_IO);
-    unlink(test_path("checkpoints.pth"));
+    unlink(in_folder("checkpoints.pth"));
     write_network(1);
-    write_text(test_path("feature_bank_mlp.pt"), "");
+    write_text(in_folder("feature_bank_mlp.pt"), "");
     refused("a feature bank is not supported", GBT_ERR_FORMAT);
-    unlink(test_path("feature_bank_mlp.pt"));
-    write_text(test_path("mlp_feature_bank.safetensors"), "");
+    unlink(in_folder("feature_bank_mlp.pt"));
+    write_text(in_folder("mlp_feature_bank.safetensors"), "");
     refused("mlp_feature_bank.safetensors: a feature bank is not supported", GBT_ERR_FORMAT);
-    unlink(test_path("mlp_feature_bank.safetensors"));
+    unlink(in_folder("mlp_feature_bank.safetensors"));
     scaffold.first[2].in = 36 + 32;
     scaffold.first[2].out = 16;
     write_network(2);
@@ -304,7 +303,7 @@ static void says_what_is_wrong(void **state)
     scaffold.second[2].bias[3] = (double)NAN;
     write_network(2);
     refused("array 2.bias: value 3 is not finite", GBT_ERR_FORMAT);
-    write_text(test_path("point_cloud.ply"),
+    write_text(in_folder("point_cloud.ply"),
                "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
                "y\nproperty float z\nend_header\n1 2 3\n");
     refused("no number f_anchor_feat_0 (wanted anchors of Scaffold-GS)", GBT_ERR_FORMAT);
@@ -357,5 +356,5 @@ int main(void)
         cmocka_unit_test(says_what_is_wrong),
         cmocka_unit_test(damaged_arrays),
     };
-    return cmocka_run_group_tests_name("scaffold files", tests, make_test_folder, remove_test_folder);
+    return cmocka_run_group_tests_name("scaffold files", tests, folder_make, folder_remove);
 }

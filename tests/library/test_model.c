@@ -1,17 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/library/test_model.c -- models in memory: what is refused, what can be asked, where pictures go. */
-#include "test_support.h"
-
-#include <sys/stat.h>
-#include <unistd.h>
+#include "folder.h"
 
 #include "base/image.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/make_scene.h"
 #include "gbtrace/model.h"
 #include "gbtrace/train.h"
-#include "remove_tree.h"
-#include "write_text.h"
 
 enum { W = 9, H = 7, COUNT = 2 };
 
@@ -55,10 +50,8 @@ static void assert_refused(gbt_status status, const gbt_error *err, gbt_status w
 static void what_cannot_be_opened(void **state)
 {
     (void)state;
-    char path[] = "/tmp/gbt_model_XXXXXX.ply";
-    const int file = mkstemps(path, 4);
-    assert_int_equal(write(file, "ply\nno\n", 7), 7);
-    close(file);
+    const char *path = in_folder("a.ply");
+    write_text(path, "ply\nno\n");
     const struct {
         const char *path;
         gbt_status status;
@@ -72,7 +65,6 @@ static void what_cannot_be_opened(void **state)
         assert_refused(gbt_model_open(rows[i].path, &model, &err), &err, rows[i].status, rows[i].path);
         assert_null(model);
     }
-    unlink(path);
     gbt_model_close(NULL);
 }
 
@@ -141,9 +133,7 @@ static void make_data(const char *folder, int width, int view_count)
 static void views_stay_with_other_gaussians(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/gbt_views_XXXXXX", data[64];
-    assert_non_null(mkdtemp(folder));
-    snprintf(data, sizeof data, "%s/data", folder);
+    const char *data = in_folder("data");
     make_data(data, 16, 4);
     gbt_model *model = made();
     size_t count;
@@ -161,7 +151,6 @@ static void views_stay_with_other_gaussians(void **state)
     for (int k = 0; k < 3; k++)
         assert_true(fabs(before.camera.center[k] - after.camera.center[k]) < 1e-12);
     gbt_model_close(model);
-    assert_int_equal(remove_tree(folder), 0);
 }
 
 /* Quaternions of length 2, opacities as logits. The second row is not usable, the third out of view. */
@@ -189,12 +178,10 @@ static void gaussians_of_a_file(void **state)
                                                           {1, 0.5f, 0.25f, 0, 0, 0}};
     static float of_file[VALUES], of_arrays[VALUES], d_rgb[VALUES];
     float values[CLASSES][WIDEST * COUNT], d[CLASSES][WIDEST * COUNT];
-    char path[] = "/tmp/gbt_model_XXXXXX.ply";
-    close(mkstemps(path, 4));
+    const char *path = in_folder("a.ply");
     write_text(path, of_a_file);
     gbt_model *file, *arrays;
     assert_ok(gbt_model_open(path, &file, NULL));
-    unlink(path);
     assert_int_equal(gbt_model_get_info(file).gaussians, COUNT);
     assert_ok(gbt_model_get_gaussians(file, NULL, NULL, NULL, NULL, NULL, NULL));
     assert_ok(gbt_model_get_gaussians(file, values[0], values[1], values[2], values[3], values[4], NULL));
@@ -243,24 +230,16 @@ static void gaussians_of_a_file(void **state)
 static void views_do_not_depend_on_those_before(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/gbt_views_XXXXXX", data[64], path[128];
-    assert_non_null(mkdtemp(folder));
-    snprintf(data, sizeof data, "%s/data", folder);
+    const char *data = in_folder("data");
     make_data(data, 32, 4);
-    snprintf(path, sizeof path, "%s/cfg_args", folder);
-    write_text(path, "Namespace(source_path='/nowhere', resolution=2, white_background=True)");
-    snprintf(path, sizeof path, "%s/cameras.json", folder);
-    write_text(path,
+    write_text(in_folder("cfg_args"),
+               "Namespace(source_path='/nowhere', resolution=2, white_background=True)");
+    write_text(in_folder("cameras.json"),
                "[{\"id\": 0, \"img_name\": \"0\", \"width\": 40, \"height\": 30, \"fx\": 30, \"fy\": 30,"
                " \"position\": [0, 0, 0], \"rotation\": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]");
-    snprintf(path, sizeof path, "%s/point_cloud", folder);
-    assert_int_equal(mkdir(path, 0777), 0);
-    snprintf(path, sizeof path, "%s/point_cloud/iteration_7", folder);
-    assert_int_equal(mkdir(path, 0777), 0);
-    snprintf(path, sizeof path, "%s/point_cloud/iteration_7/point_cloud.ply", folder);
-    write_text(path, of_a_file);
+    write_text(in_folder("point_cloud/iteration_7/point_cloud.ply"), of_a_file);
     gbt_model *model;
-    assert_ok(gbt_model_open(folder, &model, NULL));
+    assert_ok(gbt_model_open(test_folder, &model, NULL));
     const gbt_model_settings settings = gbt_model_get_settings(model);
     assert_true(settings.background[1] == 1);
     const char *const from[] = {data, NULL, data};
@@ -273,7 +252,6 @@ static void views_do_not_depend_on_those_before(void **state)
         assert_int_equal(view.camera.width, widths[i]);
     }
     gbt_model_close(model);
-    assert_int_equal(remove_tree(folder), 0);
 }
 
 /* The first photo of a COLMAP model is taken from a third of its distance to the world's origin. */
@@ -298,11 +276,7 @@ static void bring_nearer(const char *data)
 static void a_close_up_looks_as_in_training(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/gbt_near_XXXXXX", data[64], run[64], out[64], path[256];
-    assert_non_null(mkdtemp(folder));
-    snprintf(data, sizeof data, "%s/data", folder);
-    snprintf(run, sizeof run, "%s/run", folder);
-    snprintf(out, sizeof out, "%s/out", folder);
+    const char *data = in_folder("data"), *run = in_folder("run"), *out = in_folder("out");
     make_data(data, 48, 24);
     bring_nearer(data);
     gbt_train_def def = gbt_train_def_default();
@@ -328,8 +302,7 @@ static void a_close_up_looks_as_in_training(void **state)
     float *rgb = malloc(values * sizeof *rgb);
     image png;
     assert_ok(gbt_model_render(model, &near.camera, 0, &(gbt_picture){.rgb = rgb}, NULL));
-    snprintf(path, sizeof path, "%s/%s", out, near.name);
-    assert_ok(image_read(path, &png, NULL));
+    assert_ok(image_read(in_folder("out/%s", near.name), &png, NULL));
     assert_int_equal(3 * (size_t)png.width * (size_t)png.height, values);
     for (size_t i = 0; i < values; i++)
         assert_true(fabsf(fminf(fmaxf(rgb[i], 0), 1) - png.pixels[i]) < 1.0f / 255);
@@ -339,7 +312,6 @@ static void a_close_up_looks_as_in_training(void **state)
     assert_refused(gbt_model_get_gaussians(model, NULL, NULL, NULL, NULL, NULL, &err), &err, GBT_ERR_ARGUMENT,
                    "networks");
     gbt_model_close(model);
-    assert_int_equal(remove_tree(folder), 0);
 }
 
 static void settings_are_checked(void **state)
@@ -519,18 +491,19 @@ static void raised_scales_follow_the_largest(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(what_cannot_be_opened),
-                                       cmocka_unit_test(gaussians_that_are_refused),
-                                       cmocka_unit_test(what_can_be_asked),
-                                       cmocka_unit_test(views_stay_with_other_gaussians),
-                                       cmocka_unit_test(gaussians_of_a_file),
-                                       cmocka_unit_test(views_do_not_depend_on_those_before),
-                                       cmocka_unit_test(a_close_up_looks_as_in_training),
-                                       cmocka_unit_test(settings_are_checked),
-                                       cmocka_unit_test(pictures_go_where_they_should),
-                                       cmocka_unit_test(one_far_from_the_others),
-                                       cmocka_unit_test(what_is_not_rendered),
-                                       cmocka_unit_test(gradients_point_the_right_way),
-                                       cmocka_unit_test(raised_scales_follow_the_largest)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(what_cannot_be_opened, folder_make, folder_remove),
+        cmocka_unit_test(gaussians_that_are_refused),
+        cmocka_unit_test(what_can_be_asked),
+        cmocka_unit_test_setup_teardown(views_stay_with_other_gaussians, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(gaussians_of_a_file, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(views_do_not_depend_on_those_before, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(a_close_up_looks_as_in_training, folder_make, folder_remove),
+        cmocka_unit_test(settings_are_checked),
+        cmocka_unit_test(pictures_go_where_they_should),
+        cmocka_unit_test(one_far_from_the_others),
+        cmocka_unit_test(what_is_not_rendered),
+        cmocka_unit_test(gradients_point_the_right_way),
+        cmocka_unit_test(raised_scales_follow_the_largest)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

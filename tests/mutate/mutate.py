@@ -16,7 +16,7 @@ top = os.path.dirname(os.path.dirname(here))
 tree = build = None  # the copy, and its build folder
 jobs = os.environ.get("GBT_JOBS") or str(len(os.sched_getaffinity(0)))
 # Rooms without tests of their own, and rooms whose faults other tests see better.
-tests_of = {"base": ["base", "image"], "data": ["data", "cells", "render"], "shim": ["base", "image"], "run": ["train", "render"], "eval": ["eval", "train"], "command": ["command", "cli", "render", "bake"],
+tests_of = {"base": ["base", "image"], "data": ["data", "fuzz", "cells", "render"], "shim": ["base", "image"], "run": ["train", "render"], "eval": ["eval", "train"], "command": ["command", "cli", "render", "bake"],
             "library": ["library", "train"], "render": ["render", "command"]}
 golden_rooms = "base image bvh gb anchor trace raster frame growth train run render".split()
 slow_seconds = 60  # tests that take longer than this unchanged are left out

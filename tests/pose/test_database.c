@@ -3,20 +3,16 @@
 #include "pose/database.h"
 
 #include <sqlite3.h>
-#include <unistd.h>
 
-#include "base/file.h"
-#include "base/memory.h"
-#include "test_support.h"
+#include "folder.h"
 
 enum { PHOTOS = 2000, PAGE = 4096 };
 
-static char path[] = "/tmp/gbtrace_database_XXXXXX";
+static const char *path;
 
 /* 2,000 photos, in many pages; the third and the fourth have a position. */
 static int make_database(void **state)
 {
-    (void)state;
     static const char *const tables =
         "CREATE TABLE images(image_id INTEGER PRIMARY KEY, name TEXT UNIQUE, camera_id INTEGER, prior_tx "
         "REAL);"
@@ -27,17 +23,13 @@ static int make_database(void **state)
         "INSERT INTO keypoints SELECT image_id, image_id + 99 FROM images;"
         "INSERT INTO two_view_geometries SELECT image_id * 2147483647 + image_id + 1, 77 FROM images;";
     sqlite3 *file;
-    const int fd = mkstemp(path);
-    if (fd < 0 || close(fd) != 0 || sqlite3_open(path, &file) != SQLITE_OK)
+    if (folder_make(state) != 0)
+        return -1;
+    path = in_folder("database.db");
+    if (sqlite3_open(path, &file) != SQLITE_OK)
         return -1;
     const int code = sqlite3_exec(file, tables, NULL, NULL, NULL);
     return sqlite3_close(file) == SQLITE_OK && code == SQLITE_OK ? 0 : -1;
-}
-
-static int remove_database(void **state)
-{
-    (void)state;
-    return unlink(path);
 }
 
 static void add_pair(uint32_t a, uint32_t b, int64_t matches, void *context)
@@ -123,5 +115,5 @@ int main(void)
         cmocka_unit_test(photos_are_found), cmocka_unit_test(positions_are_numbers),
         cmocka_unit_test(damage_is_no_absence), /* spoils the file: the last */
     };
-    return cmocka_run_group_tests(tests, make_database, remove_database);
+    return cmocka_run_group_tests(tests, make_database, folder_remove);
 }

@@ -1,40 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/pose/test_known.c -- COLMAP's poses of a procedural scene against the true ones. Skipped without
    COLMAP. */
-#include <unistd.h>
-
-#include "base/file.h"
 #include "data/scene.h"
+#include "folder.h"
 #include "gbtrace/make_scene.h"
 #include "gbtrace/pose.h"
-#include "test_support.h"
 
 enum { VIEWS = 48, PHOTOS = 12 };
-
-static char work[] = "/tmp/gbtrace_pose_XXXXXX";
-
-static const char *in_work(const char *name)
-{
-    static char paths[4][256];
-    static int next;
-    char *path = paths[next++ % 4];
-    snprintf(path, sizeof paths[0], "%s/%s", work, name);
-    return path;
-}
-
-static int set_up(void **state)
-{
-    (void)state;
-    return mkdtemp(work) == NULL;
-}
-
-static int clean_up(void **state)
-{
-    (void)state;
-    char command[300];
-    snprintf(command, sizeof command, "/bin/rm -rf '%s'", work);
-    return system(command);
-}
 
 /* The first photos of the scene: neighbours, 7.5 degrees apart, from two rings. */
 static void take_photos(void)
@@ -47,13 +19,11 @@ static void take_photos(void)
     def.view_count = VIEWS;
     def.samples = 4;
     def.points = 200;
-    assert_ok(gbt_make_scene(&def, in_work("scene"), &err));
-    assert_ok(file_make_folder(in_work("the photos"), &err));
+    assert_ok(gbt_make_scene(&def, in_folder("scene"), &err));
+    assert_ok(file_make_folder(in_folder("the photos"), &err));
     for (int i = 0; i < PHOTOS; i++) {
-        char from[64], to[64];
-        snprintf(from, sizeof from, "scene/images/%04d.png", i);
-        snprintf(to, sizeof to, "the photos/%04d.png", i);
-        assert_int_equal(link(in_work(from), in_work(to)), 0);
+        const char *from = in_folder("scene/images/%04d.png", i);
+        assert_int_equal(link(from, in_folder("the photos/%04d.png", i)), 0);
     }
 }
 
@@ -121,7 +91,7 @@ static void compare(const scene *ours, const scene *truth)
 static gbt_status find(const gbt_pose_def *def)
 {
     gbt_error err = {0};
-    const gbt_status status = gbt_pose(in_work("the photos"), def, in_work("the data"), stdout, &err);
+    const gbt_status status = gbt_pose(in_folder("the photos"), def, in_folder("the data"), stdout, &err);
     if (status != GBT_OK)
         print_message("%s\n", err.text);
     return status;
@@ -140,8 +110,8 @@ static void test_poses_of_a_known_scene(void **state)
     def.camera_model = GBT_POSE_CAMERA_PINHOLE;
     take_photos();
     assert_ok(find(&def));
-    assert_ok(scene_load(in_work("the data"), NULL, &ours, &err));
-    assert_ok(scene_load(in_work("scene"), NULL, &truth, &err));
+    assert_ok(scene_load(in_folder("the data"), NULL, &ours, &err));
+    assert_ok(scene_load(in_folder("scene"), NULL, &truth, &err));
     assert_int_equal(ours.view_count, PHOTOS);
     compare(&ours, &truth);
     scene_free(&ours);
@@ -149,7 +119,7 @@ static void test_poses_of_a_known_scene(void **state)
     /* Once finished, the same call says the same again, without COLMAP. */
     assert_int_equal(setenv("PATH", "/nothing", 1), 0);
     assert_ok(find(&def));
-    assert_ok(gbt_pose(in_work("the photos"), &def, in_work("the data"), NULL, &err)); /* to nobody */
+    assert_ok(gbt_pose(in_folder("the photos"), &def, in_folder("the data"), NULL, &err)); /* to nobody */
     def.camera_model = GBT_POSE_CAMERA_OPENCV;
     assert_int_equal(find(&def), GBT_ERR_ARGUMENT);
 }
@@ -157,5 +127,5 @@ static void test_poses_of_a_known_scene(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_poses_of_a_known_scene)};
-    return cmocka_run_group_tests(tests, set_up, clean_up);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

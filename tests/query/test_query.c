@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/query/test_query.c -- balls by place: every kind against a test of every ball, far from the origin;
    sources, files of queries, and what is refused. */
-#include "test_support.h"
-
-#include <math.h>
-#include <unistd.h>
+#include "folder.h"
 
 #include "anchor/decode.h"
-#include "base/memory.h"
 #include "base/rng.h"
 #include "gbtrace/query.h"
 #include "io/model_file.h"
@@ -221,14 +217,6 @@ static void what_is_refused(void **state)
 
 /* ---- files ---- */
 
-static void write_text(char *path, int tail, const char *what)
-{
-    const int file = mkstemps(path, tail);
-    assert_true(file >= 0);
-    assert_int_equal(write(file, what, strlen(what)), (ssize_t)strlen(what));
-    close(file);
-}
-
 static void expect_printed(const char *path, const gbt_query_def *def, const char *wanted)
 {
     char *text = NULL;
@@ -245,14 +233,13 @@ static void expect_printed(const char *path, const gbt_query_def *def, const cha
 static void files_of_balls_and_queries(void **state)
 {
     (void)state;
-    char balls[] = "/tmp/gbt_query_XXXXXX.txt", ply[] = "/tmp/gbt_query_XXXXXX.ply",
-         from[] = "/tmp/gbt_query_XXXXXX.csv", bad[] = "/tmp/gbt_query_XXXXXX.txt";
-    write_text(balls, 4, "# x y z radius\n0 0 0 1\n\n5000000.25, 0, 0, 2 # far\n");
-    write_text(ply, 4,
-               "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n"
-               "property double z\nproperty float radius\nend_header\n0 0 0 1\n5000000.25 0 0 2\n");
-    write_text(from, 4, "0,0,3\n5000000,0,0\n");
-    write_text(bad, 4, "1 2 3\n1 2 x\n");
+    const char *balls = in_folder("balls.txt"), *ply = in_folder("balls.ply"), *from = in_folder("from.csv"),
+               *bad = in_folder("bad.txt"), *lists = in_folder("lists.ply");
+    write_text(balls, "# x y z radius\n0 0 0 1\n\n5000000.25, 0, 0, 2 # far\n");
+    write_text(ply, "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n"
+                    "property double z\nproperty float radius\nend_header\n0 0 0 1\n5000000.25 0 0 2\n");
+    write_text(from, "0,0,3\n5000000,0,0\n");
+    write_text(bad, "1 2 3\n1 2 x\n");
     gbt_query_def def = gbt_query_def_default();
     for (int i = 0; i < 2; i++) {
         const char *path = i == 0 ? balls : ply;
@@ -279,15 +266,13 @@ static void files_of_balls_and_queries(void **state)
     def.from = ply;
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT, "vertices have no direction");
     err = (gbt_error){0};
-    char lists[] = "/tmp/gbt_query_XXXXXX.ply";
-    write_text(lists, 4,
+    write_text(lists,
                "ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float x\nproperty float y\n"
                "property float z\nend_header\n1 5 2 3\n");
     def.from = NULL;
     def.kind = GBT_QUERY_NEAREST;
     def.at = "0,0,0";
     assert_refused(gbt_query(lists, &def, stdout, &err), &err, GBT_ERR_FORMAT, "property x is a list");
-    unlink(lists);
     err = (gbt_error){0};
     def = gbt_query_def_default();
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT, "at, from: neither");
@@ -312,10 +297,6 @@ static void files_of_balls_and_queries(void **state)
     err = (gbt_error){0};
     assert_refused(gbt_query(balls, &(gbt_query_def){.at = "1,2,3", .k = 1}, stdout, &err), &err,
                    GBT_ERR_ARGUMENT, "gbt_query_def_default");
-    unlink(balls);
-    unlink(ply);
-    unlink(from);
-    unlink(bad);
 }
 
 /* The ball of an anchor holds all of its Gaussians, to where their response is 1/255, from anywhere. */
@@ -323,8 +304,7 @@ static void balls_hold_what_anchors_show(void **state)
 {
     (void)state;
     enum { COUNT = 200, OFFSETS = 4 };
-    char path[] = "/tmp/gbt_query_XXXXXX.gbt";
-    close(mkstemps(path, 4));
+    const char *path = in_folder("model.gbt");
     model m = {.anchors.offset_count = OFFSETS, .origin = {5e5, -4.5e6, 0.1}, .voxel_size = 1, .extent = 1};
     assert_ok(anchors_resize(&m.anchors, COUNT, NULL));
     for (size_t i = 0; i < 3 * COUNT; i++)
@@ -367,7 +347,6 @@ static void balls_hold_what_anchors_show(void **state)
     assert_true(seen > COUNT && fullest > 0.5);
     gbt_balls_free(balls);
     model_free(&m);
-    unlink(path);
 }
 
 int main(void)
@@ -379,5 +358,5 @@ int main(void)
         cmocka_unit_test(files_of_balls_and_queries),
         cmocka_unit_test(balls_hold_what_anchors_show),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

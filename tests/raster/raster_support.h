@@ -3,19 +3,16 @@
 #ifndef GBT_TESTS_RASTER_SUPPORT_H
 #define GBT_TESTS_RASTER_SUPPORT_H
 
-#include "base/memory.h"
-#include "base/rng.h"
-#include "raster/raster.h"
-#include "test_support.h"
+#include "gaussians_support.h"
 
-enum { FIELD_MEAN = 0, FIELD_SCALE = 3, FIELD_QUAT = 6, FIELD_OPACITY = 10, FIELD_COLOR = 11 };
+#include "base/memory.h"
+#include "raster/raster.h"
 
 typedef struct cloud_def {
     const char *name;
     size_t count;
-    float spread, scale_low, scale_high; /* means are normal, scales log-uniform */
-    float flatness;   /* the x axis is divided by this, and y too for odd ids: discs and needles */
-    double camera[3]; /* looks at the origin */
+    float spread, scale_low, scale_high, flatness; /* of scattered_gaussians() */
+    double camera[3];                              /* looks at the origin */
     int width, height;
 } cloud_def;
 
@@ -29,40 +26,10 @@ typedef struct cloud_def {
         "one pixel", 200, 1, 0.05f, 0.5f, 1, {0, 0, -5}, 1, 1                                                \
     }
 
-static inline void field_list(const gaussians *g, float *fields[GAUSSIANS_FIELD_COUNT])
-{
-    size_t i = 0;
-#define X(name, pad, meaning) fields[i++] = g->name;
-    GAUSSIANS_FIELDS(X)
-#undef X
-}
-
 static inline gaussians make_cloud(const cloud_def *def, uint64_t seed)
 {
-    gaussians g = {0};
-    assert_ok(gaussians_resize(&g, def->count, NULL));
-    float *f[GAUSSIANS_FIELD_COUNT];
-    field_list(&g, f);
-    for (size_t i = 0; i < def->count; i++) {
-        double square = 0;
-        for (uint64_t k = 0; k < 3; k++) {
-            f[FIELD_MEAN + k][i] = (float)((double)def->spread * rng_normal(seed, k, i));
-            f[FIELD_SCALE + k][i] =
-                def->scale_low * powf(def->scale_high / def->scale_low, rng_uniform(seed, 3 + k, i));
-            f[FIELD_COLOR + k][i] = rng_uniform(seed, 11 + k, i);
-        }
-        f[FIELD_SCALE][i] /= def->flatness;
-        f[FIELD_SCALE + 1][i] /= i % 2 == 1 ? def->flatness : 1;
-        for (uint64_t k = 0; k < 4; k++) {
-            f[FIELD_QUAT + k][i] = (float)rng_normal(seed, 6 + k, i);
-            square += pow((double)f[FIELD_QUAT + k][i], 2);
-        }
-        for (int k = 0; k < 4; k++)
-            f[FIELD_QUAT + k][i] = (float)((double)f[FIELD_QUAT + k][i] / sqrt(square));
-        g.opacity[i] = 0.02f + 0.98f * rng_uniform(seed, 10, i);
-    }
-    gaussians_pad(&g);
-    return g;
+    return scattered_gaussians(def->count, def->spread, def->scale_low, def->scale_high, def->flatness, 1,
+                               seed);
 }
 
 static inline gbt_camera make_camera(int width, int height, const double center[3])

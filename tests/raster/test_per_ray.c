@@ -110,7 +110,7 @@ static void agrees_with_the_tracer(void **state)
     for (size_t i = 0; i < sizeof clouds / sizeof *clouds; i++) {
         trace_settings traced_settings;
         const raster_settings s = settings_of(&traced_settings);
-        gaussians g = make_cloud(&clouds[i], 70 + i);
+        gaussians g = make_cloud(&clouds[i], 80 + i);
         const gbt_camera camera = make_camera(clouds[i].width, clouds[i].height, clouds[i].camera);
         image d_rgb = random_image(camera.width, camera.height, i);
         traced seen = trace_view(&g, &camera, &traced_settings, NULL);
@@ -185,24 +185,10 @@ static void peer_scene_agrees(void **state)
     (void)state;
     const char *path = shared_path("peer/match1500/scene.ply");
     gaussian_cloud cloud;
-    gaussians g = {0};
     if (path == NULL)
         skip();
     assert_ok(gaussian_file_read(path, &cloud, NULL));
-    assert_ok(gaussians_resize(&g, cloud.count, NULL));
-    float *f[GAUSSIANS_FIELD_COUNT];
-    field_list(&g, f);
-    for (size_t i = 0; i < cloud.count; i++) {
-        for (size_t k = 0; k < 3; k++) {
-            f[FIELD_MEAN + k][i] = cloud.mean[3 * i + k];
-            f[FIELD_SCALE + k][i] = expf(cloud.scale_log[3 * i + k]);
-            f[FIELD_COLOR + k][i] = fmaxf(0, 0.5f + 0.28209479f * cloud.sh[i * GAUSSIAN_SH_COUNT * 3 + k]);
-        }
-        for (size_t k = 0; k < 4; k++)
-            f[FIELD_QUAT + k][i] = cloud.quat[4 * i + k];
-        g.opacity[i] = cloud.opacity[i];
-    }
-    gaussians_pad(&g);
+    gaussians g = gaussians_of_cloud(&cloud, 1);
     trace_settings traced_settings;
     const raster_settings s = settings_of(&traced_settings);
     gbt_camera camera = make_camera(256, 256, (const double[3]){0, -38, 9});

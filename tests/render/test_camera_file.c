@@ -1,32 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_camera_file.c -- camera files: what each field means, and one clear line about what is
    wrong. */
-#include <unistd.h>
-
 #include "base/near.h"
 #include "exr_file.h"
+#include "folder.h"
 #include "render/camera_file.h"
-#include "write_text.h"
 
-static char folder[] = "/tmp/gbt_camera_XXXXXX", path[64], rays_path[64];
+static const char *path;
 static const double none[3] = {0, 0, 0};
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (mkdtemp(folder) == NULL)
-        return -1;
-    snprintf(path, sizeof path, "%s/c.json", folder);
-    snprintf(rays_path, sizeof rays_path, "%s/r.exr", folder);
-    return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    unlink(path);
-    unlink(rays_path);
-    return rmdir(folder);
+    const int failed = folder_make(state);
+    path = in_folder("c.json");
+    return failed;
 }
 
 #define POSE                                                                                                 \
@@ -123,7 +110,7 @@ static void rays_beside_it(void **state)
     static const char *const names[] = {"dx", "dy", "dz", "ox", "oy", "oz"};
     const float pixels[12] = {0, 0, 2, 10, 20, 30, 0, 3, 4, 11, 21, 31};
     const double shift[3] = {10, 20, 30};
-    exr_write(rays_path, 2, 1, 6, names, 2, pixels);
+    exr_write(in_folder("r.exr"), 2, 1, 6, names, 2, pixels);
     camera_file f;
     gbt_error err = {0};
     write_text(path, "{\"rays\": \"r.exr\"}");
@@ -243,5 +230,5 @@ int main(void)
         cmocka_unit_test(aperture_and_shutter), cmocka_unit_test(rays_beside_it),
         cmocka_unit_test(says_what_is_wrong),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

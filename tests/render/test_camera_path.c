@@ -7,37 +7,24 @@
 #include <unistd.h>
 
 #include "base/camera_pose.h"
-#include "base/file.h"
-#include "base/memory.h"
 #include "base/near.h"
 #include "base/vec.h"
+#include "folder.h"
 #include "render/camera_path.h"
 #include "render/camera_path_file.h"
 #include "render/video.h"
 #include "train/camera_sees.h"
-#include "write_text.h"
 
 #define PI 3.14159265358979323846
-static char folder[] = "/tmp/gbt_path_XXXXXX", file_path[64], beside_path[96];
+static const char *file_path;
 static const double none[3] = {0, 0, 0};
 static const orbit_shape as_cameras = {.radius = 0, .height = (double)NAN};
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (mkdtemp(folder) == NULL)
-        return -1;
-    snprintf(file_path, sizeof file_path, "%s/path.json", folder);
-    snprintf(beside_path, sizeof beside_path, "%s/dataparser_transforms.json", folder);
-    return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    unlink(file_path);
-    unlink(beside_path);
-    return rmdir(folder);
+    const int failed = folder_make(state);
+    file_path = in_folder("path.json");
+    return failed;
 }
 
 /* ---- cameras ---- */
@@ -575,7 +562,7 @@ static void nerfstudio_world(void **state)
     const char *const path = "{" NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}";
     for (int beside = 0; beside < 2; beside++) {
         if (beside)
-            write_text(beside_path, "{" WORLD "}");
+            write_text(in_folder("dataparser_transforms.json"), "{" WORLD "}");
         camera_path p = read_good(
             beside ? path : "{" WORLD ", " NERF ", \"camera_path\": [{" AT_123 ", \"fov\": 90}]}", none, 0);
         const gbt_camera *c = &p.shots[0].camera;
@@ -587,7 +574,7 @@ static void nerfstudio_world(void **state)
         }
         camera_path_free(&p);
     }
-    unlink(beside_path);
+    unlink(in_folder("dataparser_transforms.json"));
 }
 
 static const struct bad_case {
@@ -667,19 +654,17 @@ static void says_what_is_wrong(void **state)
 
 static void no_film_left(const char *path)
 {
-    char part[128];
     assert_false(file_exists(path));
-    snprintf(part, sizeof part, "%s/.%s.tmp", folder, path + strlen(folder) + 1);
-    assert_false(file_exists(part));
+    assert_false(file_exists(in_folder(".%s.tmp", strrchr(path, '/') + 1)));
 }
 
 static void film_without_ffmpeg(void **state)
 {
     (void)state;
-    char path[96], search[4096];
+    const char *path = in_folder("clip.mp4");
+    char search[4096];
     video *v;
     gbt_error err = {0};
-    snprintf(path, sizeof path, "%s/clip.mp4", folder);
     snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
     setenv("PATH", "/nowhere", 1);
     gbt_status status = video_open(path, 16, 16, 30, &v, &err);
@@ -704,16 +689,15 @@ static void film_without_ffmpeg(void **state)
 static void film_that_fails(void **state)
 {
     (void)state;
-    char path[96], program[96], search[4096];
+    const char *path = in_folder("clip.mp4"), *program = in_folder("ffmpeg");
+    char search[4096];
     video *v;
     gbt_error err = {0};
     image picture;
-    snprintf(path, sizeof path, "%s/clip.mp4", folder);
-    snprintf(program, sizeof program, "%s/ffmpeg", folder);
     write_text(program, "#!/bin/sh\necho first >&2\necho no such encoder >&2\nexit 7\n");
     assert_int_equal(chmod(program, 0755), 0);
     snprintf(search, sizeof search, "%s", getenv("PATH") != NULL ? getenv("PATH") : "");
-    setenv("PATH", folder, 1);
+    setenv("PATH", test_folder, 1);
     signal(SIGCHLD, SIG_IGN);
     assert_int_equal(video_open(path, 256, 256, 30, &v, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "clip.mp4: SIGCHLD is ignored"));
@@ -734,7 +718,6 @@ static void film_that_fails(void **state)
     assert_int_equal(video_close(v, false, &ignored), GBT_OK);
     no_film_left(path);
     image_free(&picture);
-    unlink(program);
 }
 
 /** Grey that grows from frame to frame, with a red last one, and back from the file; colours as BT.709. */
@@ -747,11 +730,10 @@ static void film_and_back(void **state)
         print_message("ffmpeg is not there: skipped\n");
         skip();
     }
-    char path[96], raw[96], command[512];
+    const char *path = in_folder("clip.%s", ending), *raw = in_folder("frames.rgb");
+    char command[2048];
     video *v;
     image picture;
-    snprintf(path, sizeof path, "%s/clip.%s", folder, ending);
-    snprintf(raw, sizeof raw, "%s/frames.rgb", folder);
     assert_ok(video_open(path, SIDE, SIDE, 10, &v, &assert_ok_err_));
     assert_ok(image_alloc(&picture, SIDE, SIDE, 3, &assert_ok_err_));
     for (int frame = 0; frame < COUNT; frame++) {
@@ -776,8 +758,6 @@ static void film_and_back(void **state)
         assert_near(bytes[(COUNT - 1) * PICTURE + MIDDLE + k], 255 * (double)red[k], 4);
     mem_free(bytes);
     image_free(&picture);
-    unlink(path);
-    unlink(raw);
 }
 
 int main(void)
@@ -808,5 +788,5 @@ int main(void)
         {.name = "film and back: webm", .test_func = film_and_back, .initial_state = "webm"},
         {.name = "film and back: gif", .test_func = film_and_back, .initial_state = "gif"},
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

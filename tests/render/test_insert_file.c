@@ -1,34 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_insert_file.c -- insert files: what each field means, and one clear line about what is
    wrong. */
-#include <unistd.h>
-
-#include "base/file.h"
-#include "base/memory.h"
 #include "base/near.h"
+#include "folder.h"
 #include "render/insert_file.h"
-#include "write_text.h"
 
-static char folder[] = "/tmp/gbt_insert_XXXXXX", path[64], mesh_path[64];
+static const char *path;
 static const double none[3] = {0, 0, 0};
 
-static int make_folder(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    if (mkdtemp(folder) == NULL)
+    if (folder_make(state) != 0)
         return -1;
-    snprintf(path, sizeof path, "%s/i.json", folder);
-    snprintf(mesh_path, sizeof mesh_path, "%s/m.obj", folder);
-    write_text(mesh_path, "v 1 0 0\nv 0 1 0\nv 0 0 1\nv 9 9 9\nf 1 2 3\n");
+    path = in_folder("i.json");
+    write_text(in_folder("m.obj"), "v 1 0 0\nv 0 1 0\nv 0 0 1\nv 9 9 9\nf 1 2 3\n");
     return 0;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    unlink(path);
-    unlink(mesh_path);
-    return rmdir(folder);
 }
 
 static insert_scene read_good(const char *text, const double origin[3])
@@ -171,5 +157,5 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(defaults), cmocka_unit_test(placed),
                                        cmocka_unit_test(says_what_is_wrong),
                                        cmocka_unit_test(without_memory)};
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

@@ -1,35 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_peak.c -- memory as the kernel counts it, of a file drawn below a limit, and the picture.
  */
-#include "test_support.h"
 #include "child.h"
+#include "folder.h"
 
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include "base/file.h"
 #include "base/image.h"
-#include "base/memory.h"
 #include "base/rng.h"
 #include "data/gaussian_file.h"
 #include "gbtrace/evaluate.h"
 
 enum { COUNT = 400000 };
 
-static char root[64];
-
-static const char *in_root(const char *name)
-{
-    static char path[4][128];
-    static int next;
-    next = (next + 1) % 4;
-    snprintf(path[next], sizeof path[next], "%s/%s", root, name);
-    return path[next];
-}
-
 static void write_scene(void)
 {
-    static const char camera[] =
+    static const char *const camera =
         "{\"origin\": [-9, -8, 3], \"target\": [0, 0, 0], \"up\": [0, 0, 1], \"fov_x_deg\": 60, "
         "\"width\": 64, \"height\": 48}";
     gaussian_cloud c;
@@ -46,9 +30,9 @@ static void write_scene(void)
         for (size_t k = 0; k < 48; k++)
             c.sh[48 * i + k] = rng_uniform(3, 4, 48 * i + k) - 0.5f;
     }
-    assert_ok(gaussian_file_write(in_root("large.ply"), &c, (const double[3]){0, 0, 0}, NULL));
+    assert_ok(gaussian_file_write(in_folder("large.ply"), &c, (const double[3]){0, 0, 0}, NULL));
     gaussian_cloud_free(&c);
-    assert_ok(file_write_atomic(in_root("view.json"), camera, sizeof camera - 1, NULL));
+    write_text(in_folder("view.json"), camera);
 }
 
 typedef struct drawing {
@@ -60,11 +44,11 @@ static int render(void *context)
 {
     const drawing *d = context;
     gbt_render_def def = gbt_render_def_default();
-    def.camera = in_root("view.json");
+    def.camera = in_folder("view.json");
     def.format = GBT_PICTURE_EXR;
     def.memory = d->memory;
     gbt_error err = {0};
-    const gbt_status status = gbt_render(in_root("large.ply"), in_root(d->out), &def, &err);
+    const gbt_status status = gbt_render(in_folder("large.ply"), in_folder("%s", d->out), &def, &err);
     if (status != GBT_OK)
         fprintf(stderr, "%s\n", err.text);
     return (int)status;
@@ -87,8 +71,8 @@ static void below_the_limit(void **state)
         fail_msg("%zu MB were taken (limit %zu)", peak >> 20, limit >> 20);
     assert_true(draw("whole", 0, &code) > limit);
     assert_int_equal(code, GBT_OK);
-    assert_ok(image_read(in_root("cells/view.exr"), &cells, NULL));
-    assert_ok(image_read(in_root("whole/view.exr"), &whole, NULL));
+    assert_ok(image_read(in_folder("cells/view.exr"), &cells, NULL));
+    assert_ok(image_read(in_folder("whole/view.exr"), &whole, NULL));
     double largest = 0;
     for (size_t i = 0; i < 3 * 64 * 48; i++)
         largest = fmax(largest, fabs((double)cells.pixels[i] - (double)whole.pixels[i]));
@@ -103,14 +87,13 @@ static void too_little(void **state)
     int code;
     draw("none", (size_t)100 << 20, &code);
     assert_int_equal(code, GBT_ERR_NO_MEMORY);
-    assert_false(file_exists(in_root("none/view.exr")));
+    assert_false(file_exists(in_folder("none/view.exr")));
 }
 
-static int make_root(void **state)
+static int set_up(void **state)
 {
-    (void)state;
-    snprintf(root, sizeof root, "/tmp/gbt_peak_%ld", (long)getpid());
-    assert_ok(file_make_folder(root, NULL));
+    if (folder_make(state) != 0)
+        return -1;
     /* The scene is made by a child: its memory must not be this process's, nor that of the others. */
     fflush(NULL);
     const pid_t child = fork();
@@ -122,20 +105,8 @@ static int make_root(void **state)
     return waitpid(child, &ended, 0) == child && ended == 0 ? 0 : -1;
 }
 
-static int remove_root(void **state)
-{
-    (void)state;
-    static const char *const files[] = {"large.ply", "view.json", "cells/view.exr", "whole/view.exr"};
-    static const char *const folders[] = {"cells", "whole", "none", ""};
-    for (int i = 0; i < 4; i++)
-        unlink(in_root(files[i]));
-    for (int i = 0; i < 4; i++)
-        rmdir(in_root(folders[i]));
-    return 0;
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(too_little), cmocka_unit_test(below_the_limit)};
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, set_up, folder_remove);
 }

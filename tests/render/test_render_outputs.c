@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/render/test_render_outputs.c -- outputs beside a picture: their list, the files and channels, the
    anchor behind each ray. */
-#include <unistd.h>
-
 #include "anchor/fixture.h"
 #include "base/near.h"
+#include "folder.h"
 #include "render/render_outputs.h"
 
 enum { WIDTH = 40, HEIGHT = 24, ANCHORS = 300, OFFSETS = 3 };
@@ -68,7 +67,6 @@ static bool belongs_to(const gaussians *g, size_t i, const anchors *a, size_t an
 static void files_hold_what_was_traced(void **state)
 {
     (void)state;
-    char folder[] = "/tmp/gbt_outputs_XXXXXX", path[96];
     gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
                          .width = WIDTH,
                          .height = HEIGHT,
@@ -81,20 +79,17 @@ static void files_hold_what_was_traced(void **state)
     shot.focus_distance = 5;
     shot.samples = 2;
     loaded_run *r = random_run(&shot);
-    assert_non_null(mkdtemp(folder));
-    assert_ok(render_outputs_write(r, &shot, 63, folder, "view", NULL));
+    assert_ok(render_outputs_write(r, &shot, 63, test_folder, "view", NULL));
     image of[6];
     for (int i = 0; i < 6; i++) {
         image_names channels;
-        snprintf(path, sizeof path, "%s/view.%s.exr", folder, names[i]);
-        assert_ok(image_read_raw(path, &of[i], &channels, NULL));
+        assert_ok(image_read_raw(in_folder("view.%s.exr", names[i]), &of[i], &channels, NULL));
         assert_int_equal(of[i].width, WIDTH);
         assert_int_equal(of[i].height, HEIGHT);
         assert_int_equal(of[i].channels, i == 3 ? 3 : 1);
         assert_string_equal(channels.name[0], i == 3 ? "R" : "Y");
-        assert_int_equal(unlink(path), 0);
     }
-    assert_int_equal(rmdir(folder), 0);
+    assert_int_equal(count_files(test_folder), 6);
     static float depth[WIDTH * HEIGHT], hits[WIDTH * HEIGHT];
     static uint32_t strongest[WIDTH * HEIGHT];
     image rgb;
@@ -138,5 +133,5 @@ int main(void)
         cmocka_unit_test(lists_of_outputs),
         cmocka_unit_test(files_hold_what_was_traced),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

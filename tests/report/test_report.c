@@ -3,14 +3,11 @@
    missing. */
 #include <ctype.h>
 #include <jansson.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "base/camera_pose.h"
-#include "base/file.h"
 #include "base/image.h"
-#include "base/memory.h"
 #include "base/rng.h"
+#include "folder.h"
 #include "gbtrace/version.h"
 #include "report/plot.h"
 #include "report/image.h"
@@ -18,59 +15,14 @@
 #include "report/report.h"
 #include "report/text.h"
 #include "report/views.h"
-#include "test_support.h"
-
-static char folder[] = "/tmp/gbt_report_XXXXXX";
-
-/* ---- a folder to write into ---- */
-
-static void in_folder(char out[VIEW_PATH_SIZE], const char *name)
-{
-    snprintf(out, VIEW_PATH_SIZE, "%s/%s", folder, name);
-}
-
-static int make_folder(void **state)
-{
-    (void)state;
-    return mkdtemp(folder) != NULL ? 0 : -1;
-}
-
-static int remove_folder(void **state)
-{
-    (void)state;
-    static const char *const names[] = {"config",    "log.csv",   "report.html", "render.png",
-                                        "photo.png", "error.png", "torn.png"};
-    char path[VIEW_PATH_SIZE];
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        in_folder(path, names[i]);
-        unlink(path);
-    }
-    return rmdir(folder);
-}
-
-static void write_text(const char *name, const char *content)
-{
-    char path[VIEW_PATH_SIZE];
-    in_folder(path, name);
-    assert_ok(file_write_atomic(path, content, strlen(content), &assert_ok_err_));
-}
-
-static void remove_file(const char *name)
-{
-    char path[VIEW_PATH_SIZE];
-    in_folder(path, name);
-    unlink(path);
-}
 
 static void write_picture(const char *name, int width, int height, int channels, float red)
 {
-    char path[VIEW_PATH_SIZE];
     image im;
-    in_folder(path, name);
     assert_ok(image_alloc(&im, width, height, channels, &assert_ok_err_));
     for (int i = 0; i < width * height * channels; i++)
         im.pixels[i] = i % channels == 0 ? red : (float)(i % 17) / 17.0f;
-    assert_ok(image_write(path, &im, &assert_ok_err_));
+    assert_ok(image_write(in_folder("%s", name), &im, &assert_ok_err_));
     image_free(&im);
 }
 
@@ -79,11 +31,9 @@ static void write_picture(const char *name, int width, int height, int channels,
 /** The page without the pixels: what "data:" URIs hold is arbitrary text. Free with free(). */
 static char *read_page(void)
 {
-    char path[VIEW_PATH_SIZE];
     unsigned char *bytes;
     size_t count, used = 0;
-    in_folder(path, "report.html");
-    assert_ok(file_read(path, &bytes, &count, &assert_ok_err_));
+    assert_ok(file_read(in_folder("report.html"), &bytes, &count, &assert_ok_err_));
     assert_int_equal(strlen((char *)bytes), count);
     char *page = malloc(count + 1);
     assert_non_null(page);
@@ -227,7 +177,7 @@ static void write_log(int rows, const char *tail)
                     10 * (i + 1), 1.01 * (i + 1), i < rows / 2 ? 120 : 240, i < rows / 2 ? 90 : 180,
                     0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i, 5000 + 7 * i, 400000 + 100 * i);
     strcpy(csv + used, tail);
-    write_text("log.csv", csv);
+    write_text(in_folder("log.csv"), csv);
     free(csv);
 }
 
@@ -265,9 +215,9 @@ static evaluation make_views(size_t count)
         v->flip = 0.25;
         v->seconds = 0.125;
         v->gaussians = 54321;
-        in_folder(v->render_path, "render.png");
-        in_folder(v->photo_path, "photo.png");
-        in_folder(v->error_path, "error.png");
+        snprintf(v->render_path, VIEW_PATH_SIZE, "%s", in_folder("render.png"));
+        snprintf(v->photo_path, VIEW_PATH_SIZE, "%s", in_folder("photo.png"));
+        snprintf(v->error_path, VIEW_PATH_SIZE, "%s", in_folder("error.png"));
     }
     return e;
 }
@@ -277,12 +227,12 @@ static void write_pictures(void)
     write_picture("render.png", 24, 16, 3, 0.25f);
     write_picture("photo.png", 24, 16, 3, 0.75f);
     write_picture("error.png", 24, 16, 1, 0.5f);
-    write_text("config", "");
+    write_text(in_folder("config"), "");
 }
 
 static char *write_report(const evaluation *e, const json_t *metrics)
 {
-    assert_ok(report_write(folder, e, metrics, NULL, &assert_ok_err_));
+    assert_ok(report_write(test_folder, e, metrics, NULL, &assert_ok_err_));
     return check_page();
 }
 
@@ -380,15 +330,15 @@ static void bare_page(void **state)
     const bare_case *c = *state;
     write_pictures();
     if (!c->has_pictures) {
-        remove_file("render.png");
-        remove_file("photo.png");
-        write_text("error.png", "\x89PNG\r\n\x1a\n"); /* torn */
+        unlink(in_folder("render.png"));
+        unlink(in_folder("photo.png"));
+        write_text(in_folder("error.png"), "\x89PNG\r\n\x1a\n"); /* torn */
     }
-    remove_file("log.csv");
+    unlink(in_folder("log.csv"));
     if (c->log != NULL && strcmp(c->log, "full") == 0)
         write_log(20, "");
     else if (c->log != NULL)
-        write_text("log.csv", strcmp(c->log, "header") == 0 ? log_header : c->log);
+        write_text(in_folder("log.csv"), strcmp(c->log, "header") == 0 ? log_header : c->log);
     evaluation e = make_views(c->views);
     json_t *metrics = c->has_metrics ? full_metrics() : NULL;
     if (c->views == 0) {
@@ -478,7 +428,7 @@ static loaded_run *make_run(gbt_camera_model lens)
         v->name = strdup(name);
         v->path = mem_calloc(VIEW_PATH_SIZE, 1, "path", NULL);
         v->is_test = i < 2;
-        in_folder(v->path, "photo.png");
+        snprintf(v->path, VIEW_PATH_SIZE, "%s", in_folder("photo.png"));
         v->camera = (gbt_camera){.model = lens, .width = 24, .height = 16, .params = {24, 24, 12, 8}};
         assert_true(gbt_camera_look_at(at, middle, up, &v->camera));
     }
@@ -516,11 +466,11 @@ static void scene_on_the_page(void **state)
             snprintf(e.views[k].name, sizeof e.views[k].name, "%s", r->scene.views[k].name);
         e.views[1].psnr = (double)NAN;
         if (!cases[i].has_photos)
-            remove_file("photo.png");
+            unlink(in_folder("photo.png"));
         if (!cases[i].has_points)
             r->scene.points.count = 0;
         snprintf(r->model.config, sizeof r->model.config, "init = gb\nnoise\nseed = <7>\n");
-        assert_ok(report_write(folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
+        assert_ok(report_write(test_folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
         char *page = check_page();
         assert_int_equal(occurrences(page, "<figure class=\"card\"><img"), cases[i].layers);
         assert_int_equal(occurrences(page, "class=\"camera\""), 2 * (VIEWS - 2));
@@ -551,7 +501,7 @@ static void maps_lie_along_the_cameras(void **state)
                      up[3] = {0, -1, 0};
         assert_true(gbt_camera_look_at(at, ahead, up, &r->scene.views[i].camera));
     }
-    assert_ok(report_write(folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
+    assert_ok(report_write(test_folder, &e, NULL, &(report_more){.open = r}, &assert_ok_err_));
     char *page = check_page();
     const char *at = page;
     for (int map = 0; map < 2; map++) {
@@ -610,7 +560,7 @@ static void odd_metrics(void **state)
     snprintf(csv, sizeof csv, "%s%s", log_header,
              "1,1,0,120,90,-1,0,0,1e308,,1e308,-1e308,0,0,1e-320,0\n2,2,0,-5,1e300,0,0,0,-1e308,,0,0,0,0,"
              "1e305,0\n3,1e300,0,1,1,inf,0,0,nan,,nan,0x10,0,0,,0\n");
-    write_text("log.csv", csv);
+    write_text(in_folder("log.csv"), csv);
     evaluation e = make_views(1);
     e.views[0].ssim = -1e300;
     e.views[0].flip = 1e300;
@@ -649,7 +599,7 @@ static void a_resumed_run_is_made_again(void **state)
     json_object_set_new(metrics, "command", json_string("gbtrace train -o run --resume --pace 1,2 --quiet"));
     char *page = write_report(&e, metrics), wanted[VIEW_PATH_SIZE];
     snprintf(wanted, sizeof wanted, ">gbtrace train --config %s/config -o NEW --pace 333,333,334</pre>",
-             folder);
+             test_folder);
     assert_non_null(strstr(page, wanted));
     free(page);
     json_decref(metrics);
@@ -709,15 +659,14 @@ static void no_memory(void **state)
     write_log(20, "");
     evaluation e = make_views(1);
     json_t *metrics = full_metrics();
-    remove_file("report.html");
-    char path[VIEW_PATH_SIZE];
-    in_folder(path, "report.html");
+    unlink(in_folder("report.html"));
+    const char *path = in_folder("report.html");
     gbt_status status = GBT_ERR_NO_MEMORY;
     for (long n = 0; status != GBT_OK; n++) {
         gbt_error err = {0};
         assert_true(n < 500);
         mem_fail_after(n);
-        status = report_write(folder, &e, metrics, NULL, &err);
+        status = report_write(test_folder, &e, metrics, NULL, &err);
         mem_fail_after(-1);
         if (status == GBT_OK)
             break;
@@ -770,10 +719,10 @@ static const log_case log_cases[] = {
 static void reads_log(void **state)
 {
     const log_case *c = *state;
-    char csv[2048], path[VIEW_PATH_SIZE];
+    char csv[2048];
     snprintf(csv, sizeof csv, "%s%s", log_header, c->rows);
-    write_text("log.csv", csv);
-    in_folder(path, "log.csv");
+    write_text(in_folder("log.csv"), csv);
+    const char *path = in_folder("log.csv");
     training_log log;
     assert_ok(training_log_read(path, &log, &assert_ok_err_));
     assert_int_equal(log.count, c->count);
@@ -790,8 +739,8 @@ static void reads_log(void **state)
 static void every_cut_of_a_log(void **state)
 {
     (void)state;
-    char csv[2048], path[VIEW_PATH_SIZE];
-    in_folder(path, "log.csv");
+    char csv[2048];
+    const char *path = in_folder("log.csv");
     snprintf(csv, sizeof csv, "%s%s", log_header, log_cases[0].rows);
     size_t before = 0;
     for (size_t length = 0; length <= strlen(csv); length++) {
@@ -1047,8 +996,7 @@ static void large_pictures_shrink(void **state)
     } cases[] = {
         {1280, 8, 1280, 8}, {1281, 8, 640, 4}, {4, 2570, 1, 856}, {2600, 1, 2600, 1}, {400, 300, 200, 150}};
     const size_t most = 100 * 1000;
-    char path[VIEW_PATH_SIZE];
-    in_folder(path, "render.png");
+    const char *path = in_folder("render.png");
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_picture("render.png", cases[i].width, cases[i].height, 3, 0.5f);
         text t = {0};
@@ -1096,5 +1044,5 @@ int main(void)
     ADD(log_ticks_are_round);
     ADD(error_colors_are_even);
     ADD(large_pictures_shrink);
-    return _cmocka_run_group_tests("report", tests, count, make_folder, remove_folder);
+    return _cmocka_run_group_tests("report", tests, count, folder_make, folder_remove);
 }

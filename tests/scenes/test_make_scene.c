@@ -1,45 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/scenes/test_make_scene.c -- what gbt_make_scene() writes: same bytes, true points, true cameras, and
    its refusals. */
-#include "test_support.h"
+#include "folder.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include "base/file.h"
 #include "base/image.h"
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "data/gaussian_cloud.h"
 #include "data/gaussian_file.h"
 #include "data/scene.h"
 #include "gbtrace/make_scene.h"
-#include "remove_tree.h"
-
-static char root[64];
-
-static int make_root(void **state)
-{
-    (void)state;
-    snprintf(root, sizeof root, "/tmp/gbt_scenes_XXXXXX");
-    return mkdtemp(root) == NULL;
-}
-
-static int remove_root(void **state)
-{
-    (void)state;
-    return remove_tree(root);
-}
-
-static const char *under_root(const char *name)
-{
-    static char paths[4][256];
-    static int next = 0;
-    next = (next + 1) % 4;
-    snprintf(paths[next], sizeof paths[next], "%s/%s", root, name);
-    return paths[next];
-}
 
 static gbt_make_scene_def small_def(const char *name)
 {
@@ -216,7 +186,7 @@ static void check_written(const char *folder, int points_wanted, double point_no
 static void points_and_cameras_are_true(void **state)
 {
     const gbt_make_scene_def def = small_def(*state);
-    const char *folder = under_root(def.name);
+    const char *folder = in_folder("%s", def.name);
     assert_ok(gbt_make_scene(&def, folder, NULL));
     check_written(folder, def.points, def.point_noise);
     written w;
@@ -258,7 +228,7 @@ static void district_is_seen_in_parts(void **state)
     def.points = 2000;
     def.depth = false;
     def.samples = 1;
-    const char *folder = under_root("district");
+    const char *folder = in_folder("district");
     assert_ok(gbt_make_scene(&def, folder, NULL));
     written w;
     read_written(folder, &w);
@@ -284,7 +254,7 @@ static void gaussians_lie_on_surfaces(void **state)
     gbt_make_scene_def def = small_def("tabletop");
     def.gaussians = COUNT;
     char path[512];
-    const char *folder = under_root("gaussians");
+    const char *folder = in_folder("gaussians");
     assert_ok(gbt_make_scene(&def, folder, NULL));
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     scene s;
@@ -324,7 +294,7 @@ static void distorted_cameras_are_true(void **state)
     (void)state;
     gbt_make_scene_def def = small_def("tabletop");
     def.lens = GBT_MAKE_SCENE_DISTORTED;
-    const char *folder = under_root("distorted");
+    const char *folder = in_folder("distorted");
     assert_ok(gbt_make_scene(&def, folder, NULL));
     check_written(folder, def.points, def.point_noise);
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
@@ -348,7 +318,7 @@ static void lenses_that_see_far_around(void **state)
         def.depth = 0;
         def.samples = 1;
         def.lens = rows[i].lens;
-        const char *folder = under_root(i == 0 ? "fisheye" : "panorama");
+        const char *folder = in_folder("%s", i == 0 ? "fisheye" : "panorama");
         assert_ok(gbt_make_scene(&def, folder, NULL));
         written w;
         read_written(folder, &w);
@@ -365,7 +335,7 @@ static void lenses_that_see_far_around(void **state)
     }
     gbt_make_scene_def def = small_def("courtyard");
     def.lens = (gbt_make_scene_lens)99;
-    assert_int_equal(gbt_make_scene(&def, under_root("no lens"), NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(gbt_make_scene(&def, in_folder("no lens"), NULL), GBT_ERR_ARGUMENT);
 }
 
 /* What a moving camera sees of a point is where its rays say: the exact depth there ends at the point. */
@@ -376,7 +346,7 @@ static void rolling_cameras_are_true(void **state)
     def.lens = GBT_MAKE_SCENE_ROLLING;
     def.samples = 1;
     def.point_noise = 0;
-    const char *folder = under_root("rolling");
+    const char *folder = in_folder("rolling");
     assert_ok(gbt_make_scene(&def, folder, NULL));
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     scene s;
@@ -425,12 +395,12 @@ static void noise_is_what_was_asked(void **state)
     def.depth = 0;
     def.samples = 1;
     def.point_noise = 0;
-    assert_ok(gbt_make_scene(&def, under_root("exact"), NULL));
+    assert_ok(gbt_make_scene(&def, in_folder("exact"), NULL));
     def.point_noise = 0.01;
-    assert_ok(gbt_make_scene(&def, under_root("noisy"), NULL));
+    assert_ok(gbt_make_scene(&def, in_folder("noisy"), NULL));
     written exact, noisy;
-    read_written(under_root("exact"), &exact);
-    read_written(under_root("noisy"), &noisy);
+    read_written(in_folder("exact"), &exact);
+    read_written(in_folder("noisy"), &noisy);
     assert_int_equal(exact.point_count, noisy.point_count);
     double *nearest = mem_alloc(exact.point_count, sizeof *nearest, "test", NULL);
     for (size_t p = 0; p < exact.point_count; p++)
@@ -460,22 +430,6 @@ static void noise_is_what_was_asked(void **state)
     free_written(&noisy);
 }
 
-static void assert_same_file(const char *a, const char *b, const char *name)
-{
-    char path[512];
-    unsigned char *bytes[2];
-    size_t size[2];
-    const char *folders[2] = {a, b};
-    for (int i = 0; i < 2; i++) {
-        snprintf(path, sizeof path, "%s/%s", folders[i], name);
-        assert_ok(file_read(path, &bytes[i], &size[i], NULL));
-    }
-    if (size[0] != size[1] || memcmp(bytes[0], bytes[1], size[0]) != 0)
-        fail_msg("%s differs", name);
-    mem_free(bytes[0]);
-    mem_free(bytes[1]);
-}
-
 static void same_seed_same_bytes(void **state)
 {
     (void)state;
@@ -489,32 +443,26 @@ static void same_seed_same_bytes(void **state)
     def.width = 64;
     def.height = 48;
     const int threads[2] = {1, 2};
-    const char *const names[2] = {"threads1", "threads2"};
     const int before = parallel_threads();
     for (int i = 0; i < 2; i++) {
         parallel_set_threads(threads[i]);
-        assert_ok(gbt_make_scene(&def, under_root(names[i]), NULL));
+        assert_ok(gbt_make_scene(&def, in_folder("threads%d", threads[i]), NULL));
     }
     parallel_set_threads(before);
     for (size_t f = 0; f < sizeof files / sizeof files[0]; f++)
-        assert_same_file(under_root(names[0]), under_root(names[1]), files[f]);
+        assert_same_file(in_folder("threads1/%s", files[f]), in_folder("threads2/%s", files[f]));
     image depth[2]; /* EXR headers hold the time of writing, so only their values can be equal */
-    assert_ok(image_read(under_root("threads1/depth/0003.exr"), &depth[0], NULL));
-    assert_ok(image_read(under_root("threads2/depth/0003.exr"), &depth[1], NULL));
+    assert_ok(image_read(in_folder("threads1/depth/0003.exr"), &depth[0], NULL));
+    assert_ok(image_read(in_folder("threads2/depth/0003.exr"), &depth[1], NULL));
     assert_memory_equal(depth[0].pixels, depth[1].pixels,
                         (size_t)64 * 48 * (size_t)depth[0].channels * sizeof *depth[0].pixels);
     image_free(&depth[0]);
     image_free(&depth[1]);
     def.seed = 2;
     def.samples = 1;
-    assert_ok(gbt_make_scene(&def, under_root("seed2"), NULL));
-    unsigned char *bytes[2];
-    size_t size[2];
-    assert_ok(file_read(under_root("threads1/sparse/0/points3D.bin"), &bytes[0], &size[0], NULL));
-    assert_ok(file_read(under_root("seed2/sparse/0/points3D.bin"), &bytes[1], &size[1], NULL));
-    assert_true(size[0] != size[1] || memcmp(bytes[0], bytes[1], size[0]) != 0);
-    mem_free(bytes[0]);
-    mem_free(bytes[1]);
+    assert_ok(gbt_make_scene(&def, in_folder("seed2"), NULL));
+    assert_false(
+        is_same_file(in_folder("threads1/sparse/0/points3D.bin"), in_folder("seed2/sparse/0/points3D.bin")));
 }
 
 typedef struct refusal {
@@ -565,18 +513,18 @@ static void is_refused(void **state)
     gbt_make_scene_def def = small_def("tabletop");
     r->spoil(&def);
     gbt_error err = {0};
-    assert_int_equal(gbt_make_scene(&def, under_root("refused"), &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(gbt_make_scene(&def, in_folder("refused"), &err), GBT_ERR_ARGUMENT);
     assert_int_equal(err.status, GBT_ERR_ARGUMENT);
     if (strstr(err.text, r->says) == NULL)
         fail_msg("\"%s\" does not say \"%s\"", err.text, r->says);
-    assert_false(file_exists(under_root("refused"))); /* refused before anything was made */
+    assert_false(file_exists(in_folder("refused"))); /* refused before anything was made */
 }
 
 static void missing_arguments_are_refused(void **state)
 {
     (void)state;
     const gbt_make_scene_def def = small_def("tabletop");
-    assert_int_equal(gbt_make_scene(NULL, under_root("x"), NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(gbt_make_scene(NULL, in_folder("x"), NULL), GBT_ERR_ARGUMENT);
     assert_int_equal(gbt_make_scene(&def, NULL, NULL), GBT_ERR_ARGUMENT);
 }
 
@@ -584,21 +532,21 @@ static void unwritable_folder_is_io(void **state)
 {
     (void)state;
     const gbt_make_scene_def def = small_def("tabletop");
-    assert_ok(file_write_atomic(under_root("file"), "x", 1, NULL));
+    assert_ok(file_write_atomic(in_folder("file"), "x", 1, NULL));
     gbt_error err = {0};
-    assert_int_equal(gbt_make_scene(&def, under_root("file"), &err), GBT_ERR_IO);
+    assert_int_equal(gbt_make_scene(&def, in_folder("file"), &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "file"));
     err = (gbt_error){0};
-    assert_int_equal(gbt_make_scene(&def, under_root("file/below"), &err), GBT_ERR_IO);
+    assert_int_equal(gbt_make_scene(&def, in_folder("file/below"), &err), GBT_ERR_IO);
     /* A photo that cannot be written: its name is taken by a folder. */
     gbt_make_scene_def tiny = def;
     tiny.width = tiny.height = 8;
     tiny.view_count = 3;
     tiny.samples = 1;
     tiny.depth = 0;
-    assert_ok(file_make_folder(under_root("taken/images/0001.png/x"), NULL));
+    assert_ok(file_make_folder(in_folder("taken/images/0001.png/x"), NULL));
     err = (gbt_error){0};
-    assert_int_equal(gbt_make_scene(&tiny, under_root("taken"), &err), GBT_ERR_IO);
+    assert_int_equal(gbt_make_scene(&tiny, in_folder("taken"), &err), GBT_ERR_IO);
     assert_non_null(strstr(err.text, "0001.png"));
 }
 
@@ -615,7 +563,7 @@ static void names_are_the_scenes(void **state)
     int count = 0;
     for (; names[count] != NULL; count++) {
         def.name = names[count];
-        assert_ok(gbt_make_scene(&def, under_root("named"), NULL));
+        assert_ok(gbt_make_scene(&def, in_folder("named"), NULL));
         const char *summary = gbt_make_scene_summary(names[count]);
         assert_true(summary != NULL && strlen(summary) > 20 && strlen(summary) < 100 &&
                     strchr(summary, '\n') == NULL);
@@ -635,7 +583,7 @@ static void no_memory_is_a_status(void **state)
     for (long k = 0;; k += 1 + k / 4) { /* every allocation would take a minute */
         gbt_error err = {0};
         mem_fail_after(k);
-        const gbt_status status = gbt_make_scene(&def, under_root("nomem"), &err);
+        const gbt_status status = gbt_make_scene(&def, in_folder("nomem"), &err);
         mem_fail_after(-1);
         if (status == GBT_OK) {
             assert_true(k > 50);
@@ -670,5 +618,5 @@ int main(void)
     for (int i = 0; i < REFUSALS; i++)
         tests[OTHERS + i] = (struct CMUnitTest){
             .name = refusals[i].name, .test_func = is_refused, .initial_state = &refusals[i]};
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -1,24 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/stability/test_stability.c -- every row of the catalogue within its limit, in the quick sizes; and
    the study's own machinery. */
-#include "test_support.h"
+#include "folder.h"
 
-#include <unistd.h>
-
-#include "base/file.h"
-#include "base/memory.h"
 #include "lab/lab.h"
 #include "quiet.h"
 #include "report/text.h"
 #include "stability/draw.h"
 
-static char folder[] = "/tmp/gbtrace-stability-XXXXXX";
-
 static stability_study *measure(const char *only)
 {
     stability_study *study = mem_calloc(1, sizeof *study, "study", NULL);
     gbt_error err = {0};
-    if (stability_measure(only, true, folder, study, &err) != GBT_OK)
+    if (stability_measure(only, true, test_folder, study, &err) != GBT_OK)
         fail_msg("%s: %s", only, err.text);
     return study;
 }
@@ -56,7 +50,7 @@ static void names_of_cases(void **state)
     stability_study *study = mem_calloc(1, sizeof *study, "study", NULL);
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         gbt_error err = {0};
-        assert_int_equal(stability_measure(bad[i], true, folder, study, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(stability_measure(bad[i], true, test_folder, study, &err), GBT_ERR_ARGUMENT);
         assert_non_null(strstr(err.text, "A1 to A18"));
     }
     mem_free(study);
@@ -72,7 +66,7 @@ static void names_of_cases(void **state)
 
 static stability open_text(stability_study *study, const char *json, gbt_error *err)
 {
-    stability s = {.study = study, .folder = folder, .err = err, .path = "x.json"};
+    stability s = {.study = study, .folder = test_folder, .err = err, .path = "x.json"};
     s.scene = json_loads(json, 0, NULL);
     assert_non_null(s.scene);
     study->part_count = 1;
@@ -213,23 +207,18 @@ static void files_of_the_study(void **state)
     def.only = "A1,A3";
     def.quick = 1;
     assert_non_null(out);
-    assert_int_equal(lab_study_stability(&def, folder, out, &err), GBT_OK);
+    assert_int_equal(lab_study_stability(&def, test_folder, out, &err), GBT_OK);
     assert_true(ftell(out) > 500);
     fclose(out);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        char path[256];
-        unsigned char *bytes;
-        size_t count;
-        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
-        assert_ok(file_read(path, &bytes, &count, NULL));
-        assert_true(count > 500);
+        file_bytes b = read_bytes(in_folder("%s", names[i]));
+        const char *said = (const char *)b.data;
+        assert_true(b.count > 500);
         if (i < 3)
-            assert_null(strstr((const char *)bytes, "nan"));
+            assert_null(strstr(said, "nan"));
         if (i == 1) /* terminals show it too */
-            assert_true(strstr((const char *)bytes, " | <= 0 | ") != NULL &&
-                        strchr((const char *)bytes, '&') == NULL);
-        mem_free(bytes);
-        remove(path);
+            assert_true(strstr(said, " | <= 0 | ") != NULL && strchr(said, '&') == NULL);
+        mem_free(b.data);
     }
 }
 
@@ -247,9 +236,5 @@ int main(void)
 #undef X
     };
     be_quiet();
-    if (mkdtemp(folder) == NULL)
-        return 1;
-    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
-    rmdir(folder);
-    return failed;
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -110,7 +110,7 @@ static void constant_of_pairs(void **state)
     (void)state;
     static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float "
                               "y\nproperty float z\nend_header\n0 0 0\n.01 0 0\n.1 0 0\n.12 0 0\n";
-    const char *path = in_root("pairs.ply");
+    const char *path = in_folder("pairs.ply");
     assert_ok(file_write_atomic(path, ply, sizeof ply - 1, NULL));
     paper_scene look;
     assert_ok(paper_scene_look(path, 0, &look, NULL));
@@ -191,9 +191,9 @@ static void names_and_folders(void **state)
     (void)state;
     char names[STUDY_SCENES_MAX][STUDY_NAME_SIZE], path[PATH_SIZE];
     gbt_error err = {0};
-    make_tiny_scene(in_root("other/tiny"));
-    const char *same[] = {tiny, in_root("other/tiny")}, *missing[] = {in_root("nowhere")},
-               *dotted[] = {in_root("tiny/../other/./tiny/")};
+    make_tiny_scene(in_folder("other/tiny"));
+    const char *same[] = {tiny, in_folder("other/tiny")}, *missing[] = {in_folder("nowhere")},
+               *dotted[] = {in_folder("tiny/../other/./tiny/")};
     assert_int_equal(study_runs_names(same, 2, names, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "two data sets are called tiny"));
     assert_int_equal(study_runs_names(missing, 1, names, NULL), GBT_ERR_IO);
@@ -272,7 +272,7 @@ static double mean_in(const char *folder, const char *variant, const char *file,
 {
     double sum = 0;
     for (int seed = 0; seed < SEEDS; seed++)
-        sum += number_of(in_root("%s/runs/tiny/%s/seed-%d", folder, variant, seed), file, field) / SEEDS;
+        sum += number_of(in_folder("%s/runs/tiny/%s/seed-%d", folder, variant, seed), file, field) / SEEDS;
     return sum;
 }
 
@@ -327,7 +327,7 @@ static const json_t *row_of(const json_t *whole, const char *name)
 static void check_json(const char *folder)
 {
     json_t *whole;
-    assert_ok(json_read(in_root("%s/paper.json", folder), &whole, NULL));
+    assert_ok(json_read(in_folder("%s/paper.json", folder), &whole, NULL));
     const json_t *counts = row_of(whole, "tiny: initial anchors at D_max 18 against the closed form"),
                  *change = row_of(whole, "table 1, tiny: balls in place of voxels: change of PSNR, dB");
     assert_true(json_is_true(json_object_get(counts, "pass")));
@@ -344,12 +344,12 @@ static void check_json(const char *folder)
 
 static void check_page(const char *folder)
 {
-    char *page = read_text(in_root("%s/paper.md", folder)), *svg = read_text(in_root("%s/paper.svg", folder)),
-         cell[160];
+    char *page = read_text(in_folder("%s/paper.md", folder)),
+         *svg = read_text(in_folder("%s/paper.svg", folder)), cell[160];
     assert_true(count_of(page, "\n## ") == 2 && strstr(page, "\n## 1. ") != NULL &&
                 strstr(page, "\n## 2. ") != NULL);
     snprintf(cell, sizeof cell, "| tiny | %.0f | GBAI | %.0f ± ",
-             metric_of(in_root("%s/runs/tiny/gbai/seed-0", folder), "points"),
+             metric_of(in_folder("%s/runs/tiny/gbai/seed-0", folder), "points"),
              mean_over_seeds(folder, "gbai", "anchors_initial"));
     assert_int_equal(count_of(page, cell), 1);
     assert_int_equal(count_of(page, "| balls in place of voxels | initial anchors, % |"), 1);
@@ -366,21 +366,21 @@ static void the_papers_tables(void **state)
     (void)state;
     const char *data[] = {tiny};
     const lab_runs_def def = small_paper(data, "1,2");
-    paper_ok(&def, in_root("paper"));
+    paper_ok(&def, in_folder("paper"));
     check_json("paper");
     check_page("paper");
-    assert_false(file_exists(in_root("paper/runs/tiny/voxel/seed-0/checkpoints")));
-    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-10")));
+    assert_false(file_exists(in_folder("paper/runs/tiny/voxel/seed-0/checkpoints")));
+    assert_false(file_exists(in_folder("paper/runs/tiny/gbai-gbsp-depth-10")));
 
     /* The control has the constant that the study names. */
     json_t *whole;
     char wanted[64];
-    assert_ok(json_read(in_root("paper/paper.json"), &whole, NULL));
+    assert_ok(json_read(in_folder("paper/paper.json"), &whole, NULL));
     const double constant = json_number_value(
         json_object_get(json_array_get(json_object_get(whole, "scenes"), 0), "scale_constant"));
     json_decref(whole);
     assert_true(constant > 0.2 && constant < 1);
-    char *config = read_text(in_root("paper/runs/tiny/gbai-scaled/seed-1/config"));
+    char *config = read_text(in_folder("paper/runs/tiny/gbai-scaled/seed-1/config"));
     const char *line = strstr(config, "scale-factor = ");
     snprintf(wanted, sizeof wanted, "%.9g", constant);
     assert_true(line != NULL && fabs(strtod(line + 15, NULL) - constant) < 1e-9 &&
@@ -395,18 +395,18 @@ static void lpips_of_finished_runs(void **state)
     const char *data[] = {tiny};
     lab_runs_def def = small_paper(data, "1,2");
     network alex = make_alex();
-    write_network(&alex, in_root("alex.safetensors"), NULL);
+    write_network(&alex, in_folder("alex.safetensors"), NULL);
     free_network(&alex);
-    char *before = read_text(in_root("paper/paper.json")), *page;
+    char *before = read_text(in_folder("paper/paper.json")), *page;
     assert_null(strstr(before, "\"LPIPS\""));
-    const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
-    def.lpips = in_root("alex.safetensors");
-    paper_ok(&def, in_root("paper"));
-    const struct timespec now = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    const struct timespec made = time_of(in_folder("paper/runs/tiny/voxel/seed-0"));
+    def.lpips = in_folder("alex.safetensors");
+    paper_ok(&def, in_folder("paper"));
+    const struct timespec now = time_of(in_folder("paper/runs/tiny/voxel/seed-0"));
     assert_true(!is_newer(now, made));
     const double score = mean_over_seeds("paper", "voxel", "lpips_01");
     assert_true(score > 0 && score < 10 && score != mean_over_seeds("paper", "voxel", "lpips"));
-    page = read_text(in_root("paper/paper.md"));
+    page = read_text(in_folder("paper/paper.md"));
     assert_int_equal(count_of(page, " SSIM | LPIPS |\n"), 2);
     assert_int_equal(count_of(page, "| balls in place of voxels | LPIPS |"), 1);
     assert_int_equal(count_of(page, "| +0.0048 | +0.0010 to +0.0090 |"), 1); /* the paper's own four */
@@ -414,13 +414,13 @@ static void lpips_of_finished_runs(void **state)
 
     /* A result folder of 3DGS has it too. */
     gbt_export_def export = gbt_export_def_default();
-    const char *result[] = {in_root("result/")};
+    const char *result[] = {in_folder("result/")};
     json_t *means, *values;
     export.refine_steps = 0;
     export.lpips = def.lpips;
-    assert_ok(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, result, 1, NULL, NULL));
-    assert_ok(json_read(in_root("result/results.json"), &means, NULL));
-    assert_ok(json_read(in_root("result/per_view.json"), &values, NULL));
+    assert_ok(gbt_export(in_folder("paper/runs/tiny/voxel/seed-0"), &export, result, 1, NULL, NULL));
+    assert_ok(json_read(in_folder("result/results.json"), &means, NULL));
+    assert_ok(json_read(in_folder("result/per_view.json"), &values, NULL));
     const json_t *ours = json_object_get(means, "ours_40"),
                  *each = json_object_get(json_object_get(values, "ours_40"), "LPIPS");
     const double first = json_number_value(json_object_get(each, "00000.png")),
@@ -429,13 +429,13 @@ static void lpips_of_finished_runs(void **state)
     assert_near(json_number_value(json_object_get(ours, "LPIPS")), (first + second) / 2, 1e-9);
     json_decref(means);
     json_decref(values);
-    const char *file[] = {in_root("scene.ply")};
-    assert_int_equal(gbt_export(in_root("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL),
+    const char *file[] = {in_folder("scene.ply")};
+    assert_int_equal(gbt_export(in_folder("paper/runs/tiny/voxel/seed-0"), &export, file, 1, NULL, NULL),
                      GBT_ERR_ARGUMENT);
 
     def.lpips = NULL; /* no column, and the scores of before */
-    paper_ok(&def, in_root("paper"));
-    page = read_text(in_root("paper/paper.json"));
+    paper_ok(&def, in_folder("paper"));
+    page = read_text(in_folder("paper/paper.json"));
     assert_string_equal(page, before);
     mem_free(before);
     mem_free(page);
@@ -452,26 +452,26 @@ static void runs_are_made_once(void **state)
     struct timespec before[VARIANTS][SEEDS];
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++)
-            before[v][seed] = time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed));
-    bytes metrics = read_bytes(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"));
-    assert_ok(file_write_atomic(in_root("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data,
+            before[v][seed] = time_of(in_folder("paper/runs/tiny/%s/seed-%d", variants[v], seed));
+    file_bytes metrics = read_bytes(in_folder("paper/runs/tiny/gbai/seed-1/metrics.json"));
+    assert_ok(file_write_atomic(in_folder("paper/runs/tiny/gbai/seed-1/metrics.json"), metrics.data,
                                 metrics.count / 2, NULL)); /* damaged */
     /* interrupted */
-    assert_int_equal(unlink(in_root("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
+    assert_int_equal(unlink(in_folder("paper/runs/tiny/voxel-scaled/seed-0/study.json")), 0);
     /* and a table more */
     const lab_runs_def def = small_paper(data, "1,2,4");
-    paper_ok(&def, in_root("paper"));
+    paper_ok(&def, in_folder("paper"));
     for (int v = 0; v < VARIANTS; v++)
         for (int seed = 0; seed < SEEDS; seed++) {
             const bool again = (v == 1 && seed == 1) || (v == 3 && seed == 0);
-            assert_int_equal(
-                is_newer(time_of(in_root("paper/runs/tiny/%s/seed-%d", variants[v], seed)), before[v][seed]),
-                again);
+            assert_int_equal(is_newer(time_of(in_folder("paper/runs/tiny/%s/seed-%d", variants[v], seed)),
+                                      before[v][seed]),
+                             again);
         }
-    assert_false(file_exists(in_root("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7:
+    assert_false(file_exists(in_folder("paper/runs/tiny/gbai-gbsp-depth-14"))); /* 150 points end at depth 7:
                                                                                  the runs are those of D_max
                                                                                  18 */
-    char *page = read_text(in_root("paper/paper.md"));
+    char *page = read_text(in_folder("paper/paper.md"));
     assert_int_equal(count_of(page, "| D_max 14 in place of 18 | final anchors, % | 0.0 ± 0.0 | 0.0 ± "
                                     "0.0 | -6.0 |  | none at all |"),
                      1);
@@ -481,31 +481,31 @@ static void runs_are_made_once(void **state)
     lab_runs_def other = small_paper(data, "1"); /* other settings */
     other.iterations++;
     other.seeds = 1;
-    paper_ok(&other, in_root("paper"));
-    assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), before[0][0]));
-    assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-1")), before[0][1]));
-    assert_near(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "iterations"), 41, 0);
+    paper_ok(&other, in_folder("paper"));
+    assert_true(is_newer(time_of(in_folder("paper/runs/tiny/voxel/seed-0")), before[0][0]));
+    assert_false(is_newer(time_of(in_folder("paper/runs/tiny/voxel/seed-1")), before[0][1]));
+    assert_near(metric_of(in_folder("paper/runs/tiny/voxel/seed-0"), "iterations"), 41, 0);
 
-    const double finer = metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "anchors_initial");
+    const double finer = metric_of(in_folder("paper/runs/tiny/voxel/seed-0"), "anchors_initial");
     other.voxel_size = 1;
-    paper_ok(&other, in_root("paper"));
-    assert_true(metric_of(in_root("paper/runs/tiny/voxel/seed-0"), "anchors_initial") < finer);
+    paper_ok(&other, in_folder("paper"));
+    assert_true(metric_of(in_folder("paper/runs/tiny/voxel/seed-0"), "anchors_initial") < finer);
 
     /* By another path it is the same data set; the same path from another folder is another one. */
     char slash[PATH_SIZE + 1], here[4096];
     snprintf(slash, sizeof slash, "%s/", tiny);
-    const struct timespec made = time_of(in_root("paper/runs/tiny/voxel/seed-0"));
+    const struct timespec made = time_of(in_folder("paper/runs/tiny/voxel/seed-0"));
     data[0] = slash;
-    paper_ok(&other, in_root("paper"));
+    paper_ok(&other, in_folder("paper"));
     data[0] = "tiny";
     assert_non_null(getcwd(here, sizeof here));
-    assert_int_equal(chdir(root), 0);
-    paper_ok(&other, in_root("paper"));
-    assert_false(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), made));
-    assert_int_equal(chdir(in_root("other")), 0);
-    paper_ok(&other, in_root("paper"));
+    assert_int_equal(chdir(test_folder), 0);
+    paper_ok(&other, in_folder("paper"));
+    assert_false(is_newer(time_of(in_folder("paper/runs/tiny/voxel/seed-0")), made));
+    assert_int_equal(chdir(in_folder("other")), 0);
+    paper_ok(&other, in_folder("paper"));
     assert_int_equal(chdir(here), 0);
-    assert_true(is_newer(time_of(in_root("paper/runs/tiny/voxel/seed-0")), made));
+    assert_true(is_newer(time_of(in_folder("paper/runs/tiny/voxel/seed-0")), made));
 }
 
 /* Its settings are saved as JSON, which has no such bytes. */
@@ -514,11 +514,13 @@ static void data_named_in_latin_1(void **state)
     (void)state;
     const gbt_train_def def = run_def();
     study_figures figures;
-    make_tiny_scene(in_root("l\xe4nge"));
-    assert_ok(study_runs_do(in_root("l\xe4nge"), in_root("latin"), &def, NULL, &figures, &assert_ok_err_));
-    const struct timespec made = time_of(in_root("latin"));
-    assert_ok(study_runs_do(in_root("l\xe4nge"), in_root("latin"), &def, NULL, &figures, &assert_ok_err_));
-    assert_false(is_newer(time_of(in_root("latin")), made));
+    make_tiny_scene(in_folder("l\xe4nge"));
+    assert_ok(
+        study_runs_do(in_folder("l\xe4nge"), in_folder("latin"), &def, NULL, &figures, &assert_ok_err_));
+    const struct timespec made = time_of(in_folder("latin"));
+    assert_ok(
+        study_runs_do(in_folder("l\xe4nge"), in_folder("latin"), &def, NULL, &figures, &assert_ok_err_));
+    assert_false(is_newer(time_of(in_folder("latin")), made));
 }
 
 static void bad_requests(void **state)
@@ -528,44 +530,44 @@ static void bad_requests(void **state)
     static const char *const lists[] = {"", "0", "5", "1,1", "1,", ",1", "12", "1 2"};
     for (size_t i = 0; i < sizeof lists / sizeof *lists; i++) {
         const lab_runs_def def = small_paper(data, lists[i]);
-        assert_int_equal(lab_study_paper(&def, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+        assert_int_equal(lab_study_paper(&def, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     }
     lab_runs_def paper = small_paper(data, "1");
     paper.seeds = -1;
-    assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_paper(&paper, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     paper.seeds = 1;
     paper.iterations = 19;
-    assert_int_equal(lab_study_paper(&paper, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_paper(&paper, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     lab_runs_def time = lab_runs_def_default();
     time.data = data;
     time.data_count = 1;
     time.budget_seconds = 0;
-    assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_time(&time, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     time.budget_seconds = 1;
     time.seeds = 11;
-    assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_time(&time, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     gbt_make_scene_def wide = gbt_make_scene_def_default();
     wide.lens = GBT_MAKE_SCENE_FISHEYE;
     wide.width = wide.height = 32;
     wide.view_count = VIEWS;
     wide.samples = 1;
-    assert_ok(gbt_make_scene(&wide, in_root("wide"), &assert_ok_err_));
-    const char *with_wide[] = {tiny, in_root("wide")};
+    assert_ok(gbt_make_scene(&wide, in_folder("wide"), &assert_ok_err_));
+    const char *with_wide[] = {tiny, in_folder("wide")};
     time.data = with_wide;
     time.data_count = 2;
     time.seeds = 1;
     gbt_error err = {0};
-    assert_int_equal(lab_study_time(&time, in_root("bad"), stdout, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_time(&time, in_folder("bad"), stdout, &err), GBT_ERR_ARGUMENT);
     assert_non_null(strstr(err.text, "is not a pinhole's"));
     lab_runs_def needs = lab_runs_def_default();
     needs.data = data;
     needs.data_count = 1;
     needs.iterations = 19;
-    assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_int_equal(lab_study_anchors(&needs, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
     needs.iterations = 20;
     needs.seeds = 11;
-    assert_int_equal(lab_study_anchors(&needs, in_root("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
-    assert_false(file_exists(in_root("bad")));
+    assert_int_equal(lab_study_anchors(&needs, in_folder("bad"), stdout, NULL), GBT_ERR_ARGUMENT);
+    assert_false(file_exists(in_folder("bad")));
 }
 
 /* ---- quality against time ---- */
@@ -587,9 +589,9 @@ static void quality_against_time(void **state)
 {
     (void)state;
     const char *data[] = {tiny};
-    time_ok(data, in_root("time"));
+    time_ok(data, in_folder("time"));
     json_t *whole;
-    assert_ok(json_read(in_root("time/time.json"), &whole, NULL));
+    assert_ok(json_read(in_folder("time/time.json"), &whole, NULL));
     const json_t *runs = json_object_get(whole, "runs");
     assert_int_equal(json_array_size(runs), time_variant_count);
     /* the seconds, and a change for all but the default */
@@ -599,28 +601,28 @@ static void quality_against_time(void **state)
     for (size_t v = 0; v < time_variant_count; v++) {
         const json_t *psnr = json_object_get(json_array_get(runs, v), "psnr");
         assert_ok(
-            study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+            study_runs_folder(in_folder("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
         before[v] = time_of(run);
         assert_near(json_number_value(json_object_get(psnr, "mean")), metric_of(run, "psnr"), 1e-6);
         assert_true(metric_of(run, "train_seconds") >= 0.9 * time_variants[v].budgets * 0.1);
     }
-    char *config = read_text(in_root("time/runs/tiny/faithful-protocol--splats/seed-0/config"));
+    char *config = read_text(in_folder("time/runs/tiny/faithful-protocol--splats/seed-0/config"));
     assert_non_null(strstr(config, "\ncompat = 1\n"));
     assert_non_null(strstr(config, "\nrenderer = raster\n")); /* as the paper and its reference */
     mem_free(config);
     json_decref(whole);
 
-    char *page = read_text(in_root("time/time.md")), *svg = read_text(in_root("time/time.svg"));
+    char *page = read_text(in_folder("time/time.md")), *svg = read_text(in_folder("time/time.svg"));
     assert_int_equal(count_of(page, "| faithful protocol, splats |"), 2);
     assert_int_equal(count_of(page, "The faithful protocol ends at "), 1);
     assert_true(count_of(svg, ">no growth<") <= 1 && count_of(svg, "no growth") >= 1 &&
                 strstr(svg, "nan") == NULL);
     mem_free(svg);
     mem_free(page);
-    time_ok(data, in_root("time"));
+    time_ok(data, in_folder("time"));
     for (size_t v = 0; v < time_variant_count; v++) {
         assert_ok(
-            study_runs_folder(in_root("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
+            study_runs_folder(in_folder("time"), "tiny", time_variants[v].name, 0, run, sizeof run, NULL));
         assert_false(is_newer(time_of(run), before[v]));
     }
 }
@@ -638,18 +640,18 @@ static void what_a_scene_needs(void **state)
     def.seeds = 2;
     gbt_error err = {0};
     FILE *out = tmpfile();
-    if (lab_study_anchors(&def, in_root("anchors"), out, &err) != GBT_OK)
+    if (lab_study_anchors(&def, in_folder("anchors"), out, &err) != GBT_OK)
         fail_msg("%s", err.text);
     fclose(out);
     json_t *whole;
-    assert_ok(json_read(in_root("anchors/anchors.json"), &whole, NULL));
+    assert_ok(json_read(in_folder("anchors/anchors.json"), &whole, NULL));
     const json_t *runs = json_object_get(whole, "runs");
     assert_int_equal(json_array_size(runs), anchors_variant_count);
     for (size_t v = 0; v < anchors_variant_count; v++) {
         char run[PATH_SIZE];
         double psnr = 0, final = 0;
         for (uint64_t seed = 0; seed < 2; seed++) {
-            assert_ok(study_runs_folder(in_root("anchors"), "tiny", anchors_variants[v].name, seed, run,
+            assert_ok(study_runs_folder(in_folder("anchors"), "tiny", anchors_variants[v].name, seed, run,
                                         sizeof run, NULL));
             psnr += metric_of(run, "psnr") / 2;
             final += metric_of(run, "anchors_final") / 2;
@@ -667,7 +669,8 @@ static void what_a_scene_needs(void **state)
     const double paper = figure_of(json_array_get(runs, 1), "anchors_initial");
     assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") == floor(paper / 2));
     json_decref(whole);
-    char *page = read_text(in_root("anchors/anchors.md")), *svg = read_text(in_root("anchors/anchors.svg"));
+    char *page = read_text(in_folder("anchors/anchors.md")),
+         *svg = read_text(in_folder("anchors/anchors.svg"));
     assert_int_equal(count_of(page, "| random points |"), 1);
     assert_null(strstr(svg, "nan"));
     mem_free(svg);
@@ -689,14 +692,14 @@ static void make_half_black_scene(const char *folder, char second[64])
     def.points = 150;
     def.samples = 4;
     assert_ok(gbt_make_scene(&def, folder, &assert_ok_err_));
-    assert_ok(file_make_folder(in_root("black/masks"), NULL));
+    assert_ok(file_make_folder(in_folder("black/masks"), NULL));
     scene s;
     assert_ok(scene_load(folder, NULL, &s, NULL));
     assert_true(s.views[0].is_test && s.views[8].is_test);
     image black;
     assert_ok(image_alloc(&black, BLACK_WIDTH, BLACK_HEIGHT, 1, NULL));
     memset(black.pixels, 0, BLACK_WIDTH * BLACK_HEIGHT * sizeof *black.pixels);
-    assert_ok(image_write(in_root("black/masks/%s.png", s.views[0].name), &black, NULL));
+    assert_ok(image_write(in_folder("black/masks/%s.png", s.views[0].name), &black, NULL));
     snprintf(second, 64, "%s,", s.views[8].name);
     image_free(&black);
     scene_free(&s);
@@ -706,7 +709,7 @@ static void make_half_black_scene(const char *folder, char second[64])
 static json_t *study_of(const char *run, const char *name,
                         gbt_status (*study)(const lab_study_def *, const char *, FILE *, gbt_error *))
 {
-    const char *models[] = {run}, *folder = in_root("of-%s", strrchr(run, '/') + 1);
+    const char *models[] = {run}, *folder = in_folder("of-%s", strrchr(run, '/') + 1);
     lab_study_def def = lab_study_def_default();
     def.models = models;
     def.model_count = 1;
@@ -717,7 +720,7 @@ static json_t *study_of(const char *run, const char *name,
     if (study(&def, folder, out, &err) != GBT_OK)
         fail_msg("%s: %s", run, err.text);
     fclose(out);
-    assert_ok(json_read(in_root("of-%s/%s.json", strrchr(run, '/') + 1, name), &whole, NULL));
+    assert_ok(json_read(in_folder("of-%s/%s.json", strrchr(run, '/') + 1, name), &whole, NULL));
     json_t *model = json_incref(json_array_get(json_object_get(whole, "models"), 0));
     json_decref(whole);
     return model;
@@ -744,10 +747,10 @@ static void check_lpips_of_a_half(const gbt_evaluate_def *with_network)
     assert_ok(image_alloc(&mask, BLACK_WIDTH, BLACK_HEIGHT, 1, NULL));
     for (int i = 0; i < BLACK_WIDTH * BLACK_HEIGHT; i++)
         mask.pixels[i] = i % BLACK_WIDTH < BLACK_WIDTH * 3 / 4;
-    assert_ok(image_write(in_root("black/masks/0008.png.png"), &mask, NULL));
-    assert_ok(gbt_evaluate(in_root("halves-run"), with_network, &assert_ok_err_));
-    assert_ok(image_read(in_root("halves-run/renders/test/0008.png"), &render, &assert_ok_err_));
-    assert_ok(image_read(in_root("halves-run/renders/test/0008.photo.png"), &photo, &assert_ok_err_));
+    assert_ok(image_write(in_folder("black/masks/0008.png.png"), &mask, NULL));
+    assert_ok(gbt_evaluate(in_folder("halves-run"), with_network, &assert_ok_err_));
+    assert_ok(image_read(in_folder("halves-run/renders/test/0008.png"), &render, &assert_ok_err_));
+    assert_ok(image_read(in_folder("halves-run/renders/test/0008.photo.png"), &photo, &assert_ok_err_));
     assert_true(render.channels == 3 && photo.channels == 3 && render.width == BLACK_WIDTH);
     for (int i = 0; i < 2; i++) {
         assert_ok(image_alloc(&halves[i], BLACK_WIDTH / 2, BLACK_HEIGHT, 3, NULL));
@@ -760,7 +763,7 @@ static void check_lpips_of_a_half(const gbt_evaluate_def *with_network)
     }
     assert_ok(lpips_open(with_network->lpips, &net, NULL));
     assert_ok(lpips_compare(net, &halves[0], &halves[1], NULL, 0, &wanted, NULL));
-    assert_ok(json_read(in_root("halves-run/metrics.json"), &metrics, NULL));
+    assert_ok(json_read(in_folder("halves-run/metrics.json"), &metrics, NULL));
     const json_t *view = json_array_get(json_object_get(metrics, "views"), 1);
     assert_true(wanted.lpips > 0);
     assert_near(json_number_value(json_object_get(view, "lpips")), wanted.lpips, 1e-4 * wanted.lpips);
@@ -778,7 +781,7 @@ static void check_lpips_of_a_half(const gbt_evaluate_def *with_network)
 static void a_photo_masked_whole(void **state)
 {
     (void)state;
-    const char *folder = in_root("black"), *run = in_root("black-run"), *halves = in_root("halves-run");
+    const char *folder = in_folder("black"), *run = in_folder("black-run"), *halves = in_folder("halves-run");
     char second[64], line[256] = "";
     gbt_error err = {0};
     gbt_train_def def = run_def();
@@ -794,12 +797,12 @@ static void a_photo_masked_whole(void **state)
 
     network alex = make_alex();
     gbt_evaluate_def scores = gbt_evaluate_def_default();
-    scores.lpips = in_root("alex.safetensors");
+    scores.lpips = in_folder("alex.safetensors");
     write_network(&alex, scores.lpips, NULL);
     free_network(&alex);
     assert_ok(gbt_evaluate(run, &scores, NULL));
     json_t *metrics;
-    assert_ok(json_read(in_root("black-run/metrics.json"), &metrics, NULL));
+    assert_ok(json_read(in_folder("black-run/metrics.json"), &metrics, NULL));
     const json_t *views = json_object_get(metrics, "views"), *other = json_array_get(views, 1);
     assert_true(json_is_null(json_object_get(json_array_get(views, 0), "lpips")));
     assert_near(json_number_value(json_object_get(other, "lpips")), metric_of(run, "lpips"), 1e-12);
@@ -833,5 +836,5 @@ int main(void)
         cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
         cmocka_unit_test(data_named_in_latin_1),  cmocka_unit_test(a_photo_masked_whole),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -4,6 +4,7 @@
 #include "base/memory.h"
 #include "base/near.h"
 #include "data/gaussian_file.h"
+#include "gaussians_support.h"
 #include "trace/fixture.h"
 #include "trace/random_scene.h"
 #include "trace/reference.h"
@@ -204,25 +205,8 @@ static void peer_scene_stays_in_bounds(void **state)
     if (path == NULL)
         skip();
     gaussian_cloud cloud;
-    gaussians g = {0};
     assert_ok(gaussian_file_read(path, &cloud, NULL));
-    assert_ok(gaussians_resize(&g, cloud.count, NULL));
-    const float scale = 0.12f; /* to where pinhole_rays() looks */
-    float *const means[3] = {g.mean_x, g.mean_y, g.mean_z}, *const scales[3] = {g.scale_x, g.scale_y,
-                                                                                g.scale_z};
-    float *const quats[4] = {g.quat_w, g.quat_x, g.quat_y, g.quat_z}, *const colors[3] = {g.red, g.green,
-                                                                                          g.blue};
-    for (size_t i = 0; i < cloud.count; i++) {
-        for (size_t k = 0; k < 3; k++) {
-            means[k][i] = scale * cloud.mean[3 * i + k];
-            scales[k][i] = scale * expf(cloud.scale_log[3 * i + k]);
-            colors[k][i] = fmaxf(0, 0.5f + 0.28209479f * cloud.sh[i * GAUSSIAN_SH_COUNT * 3 + k]);
-        }
-        for (size_t k = 0; k < 4; k++)
-            quats[k][i] = cloud.quat[4 * i + k];
-        g.opacity[i] = cloud.opacity[i];
-    }
-    gaussians_pad(&g);
+    gaussians g = gaussians_of_cloud(&cloud, 0.12f); /* to where pinhole_rays() looks */
     gaussian_cloud_free(&cloud);
     ray_image rays = pinhole_rays(40, 40);
     check_scene("match2k", &g, &rays);

@@ -1,14 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/trace/test_rays.c -- rays of every kind of shot against their formulas in double, and rays from a
    file. */
-#include <unistd.h>
-
 #include "base/camera_pose.h"
-#include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "exr_file.h"
+#include "folder.h"
 #include "trace/ray_file.h"
 
 enum { W = 37, H = 23, COUNT = W * H };
@@ -452,8 +450,6 @@ static void memory_runs_out(void **state)
 
 /* ---- rays from a file ---- */
 
-static char path[] = "/tmp/gbt_rays_XXXXXX";
-
 /* Channel k of pixel i of a file, before it is disturbed. */
 static float value_of(int i, int k)
 {
@@ -476,6 +472,7 @@ static void rays_of_a_file(void **state)
         {{"c1", "c2", "c3", "c4", "c5", "c6"}, 6, {0, 1, 2, 3, 4, 5}},
     };
     const double origin[3] = {999.5, -3, 1e-3};
+    const char *path = in_folder("r.exr");
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         enum { FW = 5, FH = 3 };
         float pixels[FW * FH * 8];
@@ -535,6 +532,7 @@ static void files_that_are_not_rays(void **state)
         {"wanted an EXR of 32-bit floats", good, 6, 1, 1, 0},
     };
     const double origin[3] = {0, 0, 0};
+    const char *path = in_folder("r.exr");
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
         float pixels[2 * 2 * 6];
         for (int i = 0; i < 24; i++)
@@ -554,19 +552,6 @@ static void files_that_are_not_rays(void **state)
     assert_int_equal(ray_image_read("/nowhere/rays.exr", origin, &rays, &err), GBT_ERR_IO);
 }
 
-static int make_file(void **state)
-{
-    (void)state;
-    const int file = mkstemp(path);
-    return file < 0 ? -1 : close(file);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -584,5 +569,5 @@ int main(void)
         cmocka_unit_test(rays_of_a_file),
         cmocka_unit_test(files_that_are_not_rays),
     };
-    return cmocka_run_group_tests(tests, make_file, remove_file);
+    return cmocka_run_group_tests(tests, folder_make, folder_remove);
 }

@@ -4,10 +4,9 @@
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
-#include "base/rng.h"
 #include "base/vec.h"
 #include "data/gaussian_file.h"
-#include "test_support.h"
+#include "gaussians_support.h"
 #include "trace/fixture.h"
 #include "trace/random_scene.h"
 #include "reference_once.h"
@@ -24,44 +23,14 @@ static const size_t class_first[CLASS_COUNT + 1] = {REFERENCE_mean_x, REFERENCE_
 typedef struct cloud_def {
     const char *name;
     size_t count;
-    float spread;                /* means are normal with this std-dev */
-    float scale_low, scale_high; /* log-uniform */
-    float flatness;              /* axis x is divided by this, and y too for odd ids: discs and needles */
-    float opacity_high;
-    double camera[3]; /* looks at the origin */
+    float spread, scale_low, scale_high, flatness, opacity_high; /* of scattered_gaussians() */
+    double camera[3];                                            /* looks at the origin */
 } cloud_def;
 
 static gaussians make_cloud(const cloud_def *def, uint64_t seed)
 {
-    gaussians g = {0};
-    assert_ok(gaussians_resize(&g, def->count, NULL));
-    for (size_t i = 0; i < def->count; i++) {
-        const double s = (double)def->spread;
-        g.mean_x[i] = (float)(s * rng_normal(seed, 0, i));
-        g.mean_y[i] = (float)(s * rng_normal(seed, 1, i));
-        g.mean_z[i] = (float)(s * rng_normal(seed, 2, i));
-        const float ratio = def->scale_high / def->scale_low;
-        g.scale_x[i] = def->scale_low * powf(ratio, rng_uniform(seed, 3, i)) / def->flatness;
-        g.scale_y[i] =
-            def->scale_low * powf(ratio, rng_uniform(seed, 4, i)) / (i % 2 == 1 ? def->flatness : 1);
-        g.scale_z[i] = def->scale_low * powf(ratio, rng_uniform(seed, 5, i));
-        double q[4], square = 0;
-        for (uint64_t k = 0; k < 4; k++) {
-            q[k] = rng_normal(seed, 6 + k, i);
-            square += q[k] * q[k];
-        }
-        const double inverse = 1 / sqrt(square);
-        g.quat_w[i] = (float)(q[0] * inverse);
-        g.quat_x[i] = (float)(q[1] * inverse);
-        g.quat_y[i] = (float)(q[2] * inverse);
-        g.quat_z[i] = (float)(q[3] * inverse);
-        g.opacity[i] = 0.02f + (def->opacity_high - 0.02f) * rng_uniform(seed, 10, i);
-        g.red[i] = rng_uniform(seed, 11, i);
-        g.green[i] = rng_uniform(seed, 12, i);
-        g.blue[i] = rng_uniform(seed, 13, i);
-    }
-    gaussians_pad(&g);
-    return g;
+    return scattered_gaussians(def->count, def->spread, def->scale_low, def->scale_high, def->flatness,
+                               def->opacity_high, seed);
 }
 
 static gbt_camera camera_at(const double center[3], const double target[3], int width, int height,
@@ -144,14 +113,6 @@ static image random_gradient(const ray_image *rays, uint64_t seed)
     return d;
 }
 
-static void field_list(const gaussians *g, const float *fields[GAUSSIANS_FIELD_COUNT])
-{
-    size_t i = 0;
-#define X(name, pad, meaning) fields[i++] = g->name;
-    GAUSSIANS_FIELDS(X)
-#undef X
-}
-
 /* Rays on which rounding may change the hits: alpha within 1e-6 of a cut, T within 1e-9 of the stop, depths
    closer than float32 can tell. */
 static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
@@ -232,7 +193,7 @@ static figures compare(const gaussians *g, const trace_settings *s, const ray_im
             out.T_error = fmax(out.T_error, fabs((double)t.T[i] - T[i]));
     }
     out.psnr = square > 0 ? -10 * log10(square / (3.0 * (double)(n - out.band))) : 200;
-    const float *got[GAUSSIANS_FIELD_COUNT];
+    float *got[GAUSSIANS_FIELD_COUNT];
     field_list(&t.d, got);
     for (int class = 0; class < CLASS_COUNT; class ++) {
         double error = 0, norm = 0;
@@ -526,7 +487,7 @@ static void needles_one_by_one(void **state)
             assert_true(alpha >= 0 && alpha <= 0.9 + 1e-6); /* false for NaN */
             seen += count;
             error[i] = fabs(alpha - (count > 0 ? hits[0].alpha : 0));
-            const float *d[GAUSSIANS_FIELD_COUNT];
+            float *d[GAUSSIANS_FIELD_COUNT];
             field_list(&t.d, d);
             for (size_t f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
                 assert_true(isfinite(d[f][0]));
@@ -661,7 +622,7 @@ static void one_hundred_thousand_hits(void **state)
             const double d_in[3] = {(double)d_rgb.pixels[0], (double)d_rgb.pixels[1],
                                     (double)d_rgb.pixels[2]};
             assert_ok(reference_backward(&g, &s, &rays, d_in, NULL, d, NULL));
-            const float *got[GAUSSIANS_FIELD_COUNT];
+            float *got[GAUSSIANS_FIELD_COUNT];
             field_list(&t.d, got);
             for (int class = 0; class < CLASS_COUNT; class ++) {
                 double error = 0, norm = 0;
@@ -878,7 +839,7 @@ static void assert_same(const traced *a, const traced *b, size_t rays, size_t co
     assert_memory_equal(a->rgb.pixels, b->rgb.pixels, 3 * rays * sizeof(float));
     assert_memory_equal(a->T, b->T, rays * sizeof(float));
     assert_memory_equal(a->weight, b->weight, count * sizeof(float));
-    const float *x[GAUSSIANS_FIELD_COUNT], *y[GAUSSIANS_FIELD_COUNT];
+    float *x[GAUSSIANS_FIELD_COUNT], *y[GAUSSIANS_FIELD_COUNT];
     field_list(&a->d, x);
     field_list(&b->d, y);
     for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
@@ -1048,7 +1009,7 @@ static void broken_gaussians_are_left_out(void **state)
     image d_rgb = random_gradient(&rays, 90);
     traced t = trace_all(&g, &s, &rays, &d_rgb);
     assert_int_equal(t.rejected, kernel == TRACE_LIST ? 0 : 6); /* lists count nothing */
-    const float *d[GAUSSIANS_FIELD_COUNT];
+    float *d[GAUSSIANS_FIELD_COUNT];
     field_list(&t.d, d);
     for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
         for (size_t i = 0; i < 8; i++)
@@ -1088,7 +1049,7 @@ static void no_nan_from_neighbours(void **state)
     const trace_settings s = with_background();
     image d_rgb = random_gradient(&rays, 95);
     traced t = trace_all(&g, &s, &rays, &d_rgb);
-    const float *d[GAUSSIANS_FIELD_COUNT];
+    float *d[GAUSSIANS_FIELD_COUNT];
     field_list(&t.d, d);
     for (int f = 0; f < GAUSSIANS_FIELD_COUNT; f++)
         assert_true(isfinite(d[f][0]) && isfinite(d[f][1]));
@@ -1199,25 +1160,7 @@ static void peer_scene(void **state)
         skip();
     gaussian_cloud cloud;
     assert_ok(gaussian_file_read(path, &cloud, NULL));
-    gaussians g = some(cloud.count, 0);
-    for (size_t i = 0; i < cloud.count; i++) {
-        const float *m = cloud.mean + 3 * i, *l = cloud.scale_log + 3 * i, *q = cloud.quat + 4 * i,
-                    *sh = cloud.sh + i * GAUSSIAN_SH_COUNT * 3;
-        g.mean_x[i] = m[0];
-        g.mean_y[i] = m[1];
-        g.mean_z[i] = m[2];
-        g.scale_x[i] = expf(l[0]);
-        g.scale_y[i] = expf(l[1]);
-        g.scale_z[i] = expf(l[2]);
-        g.quat_w[i] = q[0];
-        g.quat_x[i] = q[1];
-        g.quat_y[i] = q[2];
-        g.quat_z[i] = q[3];
-        g.opacity[i] = cloud.opacity[i];
-        g.red[i] = 0.5f + 0.28209479f * sh[0];
-        g.green[i] = 0.5f + 0.28209479f * sh[1];
-        g.blue[i] = 0.5f + 0.28209479f * sh[2];
-    }
+    gaussians g = gaussians_of_cloud(&cloud, 1);
     assert_int_equal(cloud.count, 2000);
     const gbt_camera camera = camera_at((double[3]){0, -38, 9}, (double[3]){0, 0, 0}, 48, 48, 38);
     ray_image rays = {0};

@@ -1,79 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/run_support.h -- a folder for runs, a tiny scene to train on, and runs that must succeed or
-   fail.
+/* tests/train/run_support.h -- a tiny scene to train on, and runs that must succeed or fail.
 
    The scene is tiny (photos of 48 x 36), so a run takes a fraction of a second. */
 #ifndef GBT_TESTS_RUN_SUPPORT_H
 #define GBT_TESTS_RUN_SUPPORT_H
 
-#include "test_support.h"
+#include "folder.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include "base/file.h"
-#include "base/memory.h"
 #include "gbtrace/make_scene.h"
-#include "remove_tree.h"
 #include "train/trainer.h"
 
 enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };
 
-static char root[64], tiny[PATH_SIZE];
-
-/* ---- folders, files ---- */
-
-static inline const char *in_root(const char *format, ...)
-{
-    static char paths[16][PATH_SIZE];
-    static int next = 0;
-    char *path = paths[next = (next + 1) % 16];
-    const int length = snprintf(path, PATH_SIZE, "%s/", root);
-    va_list list;
-    va_start(list, format);
-    vsnprintf(path + length, PATH_SIZE - (size_t)length, format, list);
-    va_end(list);
-    return path;
-}
-
-typedef struct bytes {
-    unsigned char *data;
-    size_t count;
-} bytes;
-
-static inline bytes read_bytes(const char *path)
-{
-    bytes b;
-    gbt_error err = {0};
-    if (file_read(path, &b.data, &b.count, &err) != GBT_OK)
-        fail_msg("%s", err.text);
-    return b;
-}
-
-static inline void copy_file(const char *from, const char *to)
-{
-    bytes b = read_bytes(from);
-    assert_ok(file_write_atomic(to, b.data, b.count, &assert_ok_err_));
-    mem_free(b.data);
-}
-
-static inline void assert_same_file(const char *a, const char *b)
-{
-    bytes x = read_bytes(a), y = read_bytes(b);
-    if (x.count != y.count || memcmp(x.data, y.data, x.count) != 0)
-        fail_msg("%s and %s differ", a, b);
-    mem_free(x.data);
-    mem_free(y.data);
-}
-
-static inline bool is_same_file(const char *a, const char *b)
-{
-    bytes x = read_bytes(a), y = read_bytes(b);
-    const bool same = x.count == y.count && memcmp(x.data, y.data, x.count) == 0;
-    mem_free(x.data);
-    mem_free(y.data);
-    return same;
-}
+static const char *tiny;
 
 static inline void make_tiny_scene(const char *folder)
 {
@@ -100,19 +39,11 @@ static inline void put_pose(FILE *file, const scene *s, size_t view)
 
 static inline int make_root(void **state)
 {
-    (void)state;
-    snprintf(root, sizeof root, "/tmp/gbt_train_XXXXXX");
-    if (mkdtemp(root) == NULL)
+    if (folder_make(state) != 0)
         return -1;
-    snprintf(tiny, sizeof tiny, "%s/tiny", root);
+    tiny = in_folder("tiny");
     make_tiny_scene(tiny);
     return 0;
-}
-
-static inline int remove_root(void **state)
-{
-    (void)state;
-    return remove_tree(root);
 }
 
 /* ---- runs ---- */

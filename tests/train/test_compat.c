@@ -343,7 +343,7 @@ static void write_blender(const char *folder)
 static void scenes_of_blender_lie_on_black(void **state)
 {
     (void)state;
-    const char *folder = in_root("blender");
+    const char *folder = in_folder("blender");
     write_blender(folder);
     for (int compat = 0; compat <= 1; compat++) {
         const gbt_train_def def = def_of(compat == 1);
@@ -374,5 +374,5 @@ int main(void)
         cmocka_unit_test(voxels_are_where_the_world_puts_them),
         cmocka_unit_test(scenes_of_blender_lie_on_black),
     };
-    return cmocka_run_group_tests_name("compat", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("compat", tests, make_root, folder_remove);
 }

@@ -7,7 +7,7 @@
 /* The photos of a scene of its own, each times 2^(stops * something in [-1, 1]). */
 static const char *exposed_scene(const char *name, double stops)
 {
-    const char *folder = in_root("%s", name);
+    const char *folder = in_folder("%s", name);
     scene s;
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     make_tiny_scene(folder);
@@ -113,5 +113,5 @@ int main(void)
         cmocka_unit_test(photos_without_room_count),
         cmocka_unit_test(found_exposures_can_be_left),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -63,18 +63,18 @@ static void the_same_run_in_less_memory(void **state)
     if (SANITIZED)
         skip();
     char data[PATH_SIZE];
-    snprintf(data, sizeof data, "%s", in_root("large"));
+    snprintf(data, sizeof data, "%s", in_folder("large"));
     int failed;
     in_child(make_large_scene, data, &failed);
     assert_int_equal(failed, 0);
     char whole[PATH_SIZE], less[PATH_SIZE];
-    snprintf(whole, sizeof whole, "%s", in_root("whole"));
-    snprintf(less, sizeof less, "%s", in_root("less"));
+    snprintf(whole, sizeof whole, "%s", in_folder("whole"));
+    snprintf(less, sizeof less, "%s", in_folder("less"));
     const size_t without = train_in_child(data, whole, 0, 3, false),
                  with = train_in_child(data, less, limit, 3, false);
     print_message("%zu MB without a limit, %zu with %zu\n", without >> 20, with >> 20, limit >> 20);
     assert_true(without > limit && with <= limit);
-    assert_same_file(in_root("whole/model.gbt"), in_root("less/model.gbt"));
+    assert_same_file(in_folder("whole/model.gbt"), in_folder("less/model.gbt"));
     for (uint64_t steps = 4; steps <= 5; steps++) /* the second time there are two checkpoints */
         assert_true(train_in_child(data, less, limit, steps, true) <= limit);
 }
@@ -85,8 +85,8 @@ static void too_little(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.memory = (size_t)60 << 20;
-    train_fails(tiny, in_root("none"), &def, GBT_ERR_NO_MEMORY, "60 MiB is too little");
-    assert_false(file_exists(in_root("none/model.gbt")));
+    train_fails(tiny, in_folder("none"), &def, GBT_ERR_NO_MEMORY, "60 MiB is too little");
+    assert_false(file_exists(in_folder("none/model.gbt")));
 }
 
 static void what_it_takes(void **state)
@@ -131,5 +131,5 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(the_same_run_in_less_memory),
                                        cmocka_unit_test(too_little), cmocka_unit_test(what_it_takes)};
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -70,5 +70,5 @@ int main(void)
         cmocka_unit_test(a_close_up_is_alone),
         cmocka_unit_test(a_step_has_the_near_distance_of_its_photo),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

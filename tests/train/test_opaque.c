@@ -66,5 +66,5 @@ int main(void)
         cmocka_unit_test(surfaces_become_opaque),
         cmocka_unit_test(a_background_that_means_something_stays),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -11,7 +11,6 @@
 #include "run/loaded_run.h"
 #include "train/align.h"
 #include "train/pose_file.h"
-#include "write_text.h"
 
 /* The small turn from one camera to another, in world axes: the antisymmetric part of A^T B. */
 static void turn_between(const gbt_camera *from, const gbt_camera *to, double axis[3])
@@ -97,8 +96,8 @@ static const char *many_photos(void)
     def.view_count = 24;
     def.points = 600;
     def.samples = 4;
-    assert_ok(gbt_make_scene(&def, in_root("many"), NULL));
-    return in_root("many");
+    assert_ok(gbt_make_scene(&def, in_folder("many"), NULL));
+    return in_folder("many");
 }
 
 static void disturbed_poses_come_back(void **state)
@@ -145,16 +144,16 @@ static void a_run_goes_on_with_its_poses(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.refine_poses = true;
-    train_ok(tiny, in_root("whole"), &def);
+    train_ok(tiny, in_folder("whole"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("parts"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    train_fails(tiny, in_folder("parts"), &def, GBT_ERR_INTERRUPTED, "stopped");
     def.stop_at_step = 0;
     def.resume = true;
-    train_ok(NULL, in_root("parts"), &def);
+    train_ok(NULL, in_folder("parts"), &def);
     const char *const files[] = {"model.gbt", "poses.json"};
     for (int i = 0; i < 2; i++) {
-        const bytes a = read_bytes(in_root("whole/%s", files[i])),
-                    b = read_bytes(in_root("parts/%s", files[i]));
+        const file_bytes a = read_bytes(in_folder("whole/%s", files[i])),
+                         b = read_bytes(in_folder("parts/%s", files[i]));
         assert_int_equal(a.count, b.count);
         assert_memory_equal(a.data, b.data, a.count);
         mem_free(a.data);
@@ -196,22 +195,22 @@ static void held_out_photos_are_aligned_after_a_signal(void **state)
     (void)state;
     pthread_t thread;
     char summary[PATH_SIZE];
-    snprintf(summary, sizeof summary, "%s", in_root("stopped/train.json"));
+    snprintf(summary, sizeof summary, "%s", in_folder("stopped/train.json"));
     gbt_train_def def = run_def();
     def.refine_poses = true;
     def.eval_split = "every=2";
-    train_ok(tiny, in_root("unstopped"), &def);
+    train_ok(tiny, in_folder("unstopped"), &def);
     signal(SIGTERM, SIG_IGN); /* should it come too late */
     assert_int_equal(pthread_create(&thread, NULL, signal_at_summary, summary), 0);
-    train_fails(tiny, in_root("stopped"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
+    train_fails(tiny, in_folder("stopped"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
     assert_int_equal(pthread_join(thread, NULL), 0);
     signal(SIGTERM, SIG_DFL);
-    bytes before = read_bytes(summary);
+    file_bytes before = read_bytes(summary);
     def.resume = true;
-    train_ok(NULL, in_root("stopped"), &def);
-    assert_same_file(in_root("unstopped/model.gbt"), in_root("stopped/model.gbt"));
-    assert_same_file(in_root("unstopped/poses.json"), in_root("stopped/poses.json"));
-    bytes after = read_bytes(summary);
+    train_ok(NULL, in_folder("stopped"), &def);
+    assert_same_file(in_folder("unstopped/model.gbt"), in_folder("stopped/model.gbt"));
+    assert_same_file(in_folder("unstopped/poses.json"), in_folder("stopped/poses.json"));
+    file_bytes after = read_bytes(summary);
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.data, after.data, before.count);
     mem_free(before.data);
@@ -224,9 +223,9 @@ static void whoever_opens_the_run_has_them(void **state)
 {
     (void)state;
     static loaded_run run, of_data;
-    assert_ok(loaded_run_open(in_root("whole"), NULL, 0, &run, NULL));
-    make_tiny_scene(in_root("again"));
-    assert_ok(loaded_run_open(in_root("whole"), in_root("again"), 0, &of_data, NULL));
+    assert_ok(loaded_run_open(in_folder("whole"), NULL, 0, &run, NULL));
+    make_tiny_scene(in_folder("again"));
+    assert_ok(loaded_run_open(in_folder("whole"), in_folder("again"), 0, &of_data, NULL));
     double moved = 0;
     for (size_t i = 0; i < run.scene.view_count; i++)
         for (int k = 0; k < 3; k++)
@@ -257,15 +256,15 @@ static void what_is_no_pose_is_refused(void **state)
     assert_ok(scene_load(tiny, NULL, &s, NULL));
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_error err = {0};
-        write_text(in_root("poses.json"), cases[i].text);
-        assert_int_equal(pose_file_read(in_root("poses.json"), &s, &aligned, &err), GBT_ERR_FORMAT);
+        write_text(in_folder("poses.json"), cases[i].text);
+        assert_int_equal(pose_file_read(in_folder("poses.json"), &s, &aligned, &err), GBT_ERR_FORMAT);
         if (strstr(err.text, cases[i].says) == NULL)
             fail_msg("wanted \"%s\", got: %s", cases[i].says, err.text);
     }
-    assert_ok(pose_file_write(&s, false, in_root("poses.json"), NULL));
+    assert_ok(pose_file_write(&s, false, in_folder("poses.json"), NULL));
     gbt_camera first = s.views[0].camera;
     s.views[0].camera.center[1] += 1;
-    assert_ok(pose_file_read(in_root("poses.json"), &s, &aligned, NULL));
+    assert_ok(pose_file_read(in_folder("poses.json"), &s, &aligned, NULL));
     assert_false(aligned);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12);
@@ -273,10 +272,10 @@ static void what_is_no_pose_is_refused(void **state)
     s.views[1].name[0] = '\xe4';
     snprintf(s.views[1].name + 1, strlen(s.views[1].name), "%s", s.views[0].name + 1);
     const gbt_camera second = s.views[1].camera;
-    assert_ok(pose_file_write(&s, true, in_root("poses.json"), NULL));
+    assert_ok(pose_file_write(&s, true, in_folder("poses.json"), NULL));
     s.views[0].camera.center[1] += 1;
     s.views[1].camera.center[1] += 1;
-    assert_ok(pose_file_read(in_root("poses.json"), &s, &aligned, NULL));
+    assert_ok(pose_file_read(in_folder("poses.json"), &s, &aligned, NULL));
     assert_true(aligned);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(s.views[0].camera.center[k] - first.center[k]) < 1e-12 &&
@@ -295,5 +294,5 @@ int main(void)
         cmocka_unit_test(whoever_opens_the_run_has_them),
         cmocka_unit_test(what_is_no_pose_is_refused),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -12,7 +12,6 @@
 #include "quiet.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
-#include "write_text.h"
 
 static gbt_train_def resume_def(uint64_t iterations, double budget_seconds)
 {
@@ -40,7 +39,7 @@ static void last_row(const char *run, double *step, double *progress, double *lo
 {
     char path[PATH_SIZE];
     snprintf(path, sizeof path, "%s/log.csv", run);
-    bytes log = read_bytes(path);
+    file_bytes log = read_bytes(path);
     const char *end = (const char *)log.data + log.count - 1;
     while (end > (const char *)log.data && end[-1] != '\n')
         end--;
@@ -55,7 +54,7 @@ static void a_finished_run_goes_on(void **state)
     double step, progress, loss[2];
     for (int i = 0; i < 2; i++) {
         gbt_set_threads(i + 1);
-        const char *run = in_root("further%d", i);
+        const char *run = in_folder("further%d", i);
         gbt_train_def def = run_def(), on = resume_def(2 * STEPS, 0);
         def.background = GBT_BACKGROUND_SKY; /* losses on random backgrounds could not be compared */
         train_ok(tiny, run, &def);
@@ -68,9 +67,9 @@ static void a_finished_run_goes_on(void **state)
         assert_true(number_of(run, "iterations") == 2 * STEPS);
     }
     gbt_set_threads(before);
-    assert_same_file(in_root("further0/model.gbt"), in_root("further1/model.gbt"));
+    assert_same_file(in_folder("further0/model.gbt"), in_folder("further1/model.gbt"));
     model m;
-    assert_ok(model_load(in_root("further0/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("further0/model.gbt"), &m, NULL));
     assert_int_equal(m.iterations, 2 * STEPS);
     assert_non_null(strstr(m.config, "\niterations = 120\n"));
     model_free(&m);
@@ -82,19 +81,19 @@ static void the_new_length_decides(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("straight"), &def);
+    train_ok(tiny, in_folder("straight"), &def);
     def.iterations = 3 * STEPS;
     def.stop_at_step = 1;
-    train_fails(tiny, in_root("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
+    train_fails(tiny, in_folder("stretched"), &def, GBT_ERR_INTERRUPTED, "after step 1");
     const gbt_train_def on = resume_def(STEPS, 0);
-    train_ok(tiny, in_root("stretched"), &on);
-    assert_same_file(in_root("straight/model.gbt"), in_root("stretched/model.gbt"));
+    train_ok(tiny, in_folder("stretched"), &on);
+    assert_same_file(in_folder("straight/model.gbt"), in_folder("stretched/model.gbt"));
 }
 
 static void a_run_goes_on_for_a_time(void **state)
 {
     (void)state;
-    const char *run = in_root("timed");
+    const char *run = in_folder("timed");
     const gbt_train_def def = run_def();
     train_ok(tiny, run, &def);
     for (int i = 1; i <= 2; i++) { /* from a number of steps, and from a budget */
@@ -115,14 +114,14 @@ static void a_run_goes_on_for_a_time(void **state)
 static void a_length_that_has_passed_is_refused(void **state)
 {
     (void)state;
-    const char *run = in_root("passed");
+    const char *run = in_folder("passed");
     const gbt_train_def def = run_def(), shorter = resume_def(STEPS - 1, 0);
     train_ok(tiny, run, &def);
-    bytes model_bytes = read_bytes(in_root("passed/model.gbt")),
-          config = read_bytes(in_root("passed/config"));
+    file_bytes model_bytes = read_bytes(in_folder("passed/model.gbt")),
+               config = read_bytes(in_folder("passed/config"));
     train_fails(tiny, run, &shorter, GBT_ERR_ARGUMENT, "wanted more than the 60 that it has done");
-    bytes model_after = read_bytes(in_root("passed/model.gbt")),
-          config_after = read_bytes(in_root("passed/config"));
+    file_bytes model_after = read_bytes(in_folder("passed/model.gbt")),
+               config_after = read_bytes(in_folder("passed/config"));
     assert_int_equal(model_bytes.count, model_after.count);
     assert_memory_equal(model_bytes.data, model_after.data, model_bytes.count);
     assert_int_equal(config.count, config_after.count);
@@ -137,14 +136,15 @@ static void a_length_that_has_passed_is_refused(void **state)
 static void nothing_left_changes_nothing(void **state)
 {
     (void)state;
-    const char *run = in_root("whole");
+    const char *run = in_folder("whole");
     const gbt_train_def def = run_def(), on = resume_def(0, 0), same = resume_def(STEPS, 0);
     train_ok(tiny, run, &def);
-    bytes summary = read_bytes(in_root("whole/train.json")), log = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary = read_bytes(in_folder("whole/train.json")),
+               log = read_bytes(in_folder("whole/log.csv"));
     train_ok(tiny, run, &on);
     train_ok(tiny, run, &same);
-    bytes summary_after = read_bytes(in_root("whole/train.json")),
-          log_after = read_bytes(in_root("whole/log.csv"));
+    file_bytes summary_after = read_bytes(in_folder("whole/train.json")),
+               log_after = read_bytes(in_folder("whole/log.csv"));
     assert_int_equal(summary.count, summary_after.count);
     assert_memory_equal(summary.data, summary_after.data, summary.count);
     assert_int_equal(log.count, log_after.count);
@@ -154,7 +154,7 @@ static void nothing_left_changes_nothing(void **state)
     mem_free(summary_after.data);
     mem_free(log_after.data);
     /* A kill may come after the checkpoint and before the summary. */
-    assert_int_equal(remove(in_root("whole/train.json")), 0);
+    assert_int_equal(remove(in_folder("whole/train.json")), 0);
     train_ok(tiny, run, &on);
     assert_true(number_of(run, "iterations") == STEPS);
 }
@@ -165,14 +165,14 @@ static void the_run_knows_its_data(void **state)
     char here[PATH_SIZE];
     assert_non_null(getcwd(here, sizeof here));
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("named"), &def);
+    train_ok(tiny, in_folder("named"), &def);
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("own"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    train_fails(tiny, in_folder("own"), &def, GBT_ERR_INTERRUPTED, "after step 5");
     assert_int_equal(chdir("/"), 0);
     const gbt_train_def on = resume_def(0, 0);
-    train_ok(NULL, in_root("own"), &on);
+    train_ok(NULL, in_folder("own"), &on);
     assert_int_equal(chdir(here), 0);
-    assert_same_file(in_root("named/model.gbt"), in_root("own/model.gbt"));
+    assert_same_file(in_folder("named/model.gbt"), in_folder("own/model.gbt"));
 }
 
 static void other_data_are_refused(void **state)
@@ -180,7 +180,7 @@ static void other_data_are_refused(void **state)
     (void)state;
     gbt_train_def def = run_def(), on = resume_def(0, 0);
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("first"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    train_fails(tiny, in_folder("first"), &def, GBT_ERR_INTERRUPTED, "after step 5");
     /* As many photos and points, from other places. */
     gbt_make_scene_def scene_def = gbt_make_scene_def_default();
     scene_def.name = "terrain";
@@ -190,13 +190,13 @@ static void other_data_are_refused(void **state)
     scene_def.points = 150;
     scene_def.samples = 1;
     gbt_error err = {0};
-    assert_ok(gbt_make_scene(&scene_def, in_root("elsewhere"), &err));
-    train_fails(in_root("elsewhere"), in_root("first"), &on, GBT_ERR_FORMAT, "other data");
-    train_ok(tiny, in_root("first"), &on);
-    train_fails(tiny, in_root("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
-    assert_false(file_exists(in_root("no run")));
+    assert_ok(gbt_make_scene(&scene_def, in_folder("elsewhere"), &err));
+    train_fails(in_folder("elsewhere"), in_folder("first"), &on, GBT_ERR_FORMAT, "other data");
+    train_ok(tiny, in_folder("first"), &on);
+    train_fails(tiny, in_folder("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
+    assert_false(file_exists(in_folder("no run")));
     on.overwrite = true;
-    train_fails(tiny, in_root("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
+    train_fails(tiny, in_folder("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
 }
 
 /* The sections of a container, but those of these names, as an older version wrote it. */
@@ -230,8 +230,8 @@ static void other_splits_and_points_are_refused(void **state)
     trainer t;
     const gbt_train_def def = run_def();
     char path[PATH_SIZE], old[PATH_SIZE];
-    snprintf(path, sizeof path, "%s", in_root("data.gbt"));
-    snprintf(old, sizeof old, "%s", in_root("old data.gbt"));
+    snprintf(path, sizeof path, "%s", in_folder("data.gbt"));
+    snprintf(old, sizeof old, "%s", in_folder("old data.gbt"));
     open_ok(&t, tiny, &def);
     assert_ok(checkpoint_save(&t, path, NULL));
     copy_without(path, old, "split", "points");
@@ -260,17 +260,17 @@ static void a_run_that_was_moved_keeps_its_data(void **state)
 {
     (void)state;
     gbt_train_def def = run_def(), on = resume_def(0, 0);
-    make_tiny_scene(in_root("before/data"));
+    make_tiny_scene(in_folder("before/data"));
     def.stop_at_step = 5;
-    train_fails(in_root("before/data"), in_root("before/run"), &def, GBT_ERR_INTERRUPTED, "after step 5");
-    assert_int_equal(rename(in_root("before"), in_root("behind")), 0);
-    assert_int_equal(rename(in_root("behind/run/log.csv"), in_root("behind/aside")), 0);
-    assert_ok(file_make_folder(in_root("behind/run/log.csv"), NULL));
-    train_fails(NULL, in_root("behind/run"), &on, GBT_ERR_IO, "log.csv");
-    assert_int_equal(rmdir(in_root("behind/run/log.csv")), 0);
-    assert_int_equal(rename(in_root("behind/aside"), in_root("behind/run/log.csv")), 0);
-    train_ok(NULL, in_root("behind/run"), &on);
-    assert_true(number_of(in_root("behind/run"), "iterations") == STEPS);
+    train_fails(in_folder("before/data"), in_folder("before/run"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    assert_int_equal(rename(in_folder("before"), in_folder("behind")), 0);
+    assert_int_equal(rename(in_folder("behind/run/log.csv"), in_folder("behind/aside")), 0);
+    assert_ok(file_make_folder(in_folder("behind/run/log.csv"), NULL));
+    train_fails(NULL, in_folder("behind/run"), &on, GBT_ERR_IO, "log.csv");
+    assert_int_equal(rmdir(in_folder("behind/run/log.csv")), 0);
+    assert_int_equal(rename(in_folder("behind/aside"), in_folder("behind/run/log.csv")), 0);
+    train_ok(NULL, in_folder("behind/run"), &on);
+    assert_true(number_of(in_folder("behind/run"), "iterations") == STEPS);
 }
 
 /* Its colours are learned, are in the model, and have their moments in a checkpoint. */
@@ -279,14 +279,14 @@ static void a_learned_sky_goes_on(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.background = GBT_BACKGROUND_SKY;
-    train_ok(tiny, in_root("sky"), &def);
+    train_ok(tiny, in_folder("sky"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("sky_in_two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    train_fails(tiny, in_folder("sky_in_two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
     const gbt_train_def on = resume_def(STEPS, 0);
-    train_ok(tiny, in_root("sky_in_two"), &on);
-    assert_same_file(in_root("sky/model.gbt"), in_root("sky_in_two/model.gbt"));
+    train_ok(tiny, in_folder("sky_in_two"), &on);
+    assert_same_file(in_folder("sky/model.gbt"), in_folder("sky_in_two/model.gbt"));
     model m;
-    assert_ok(model_load(in_root("sky/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("sky/model.gbt"), &m, NULL));
     assert_true(m.sky.varies);
     double size = 0;
     for (int k = 0; k < 3; k++)
@@ -311,13 +311,13 @@ static void a_pace_wins_over_a_budget(void **state)
     def.iterations = 0;
     def.budget_seconds = 1e-3;
     def.pace = "3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3,3";
-    train_ok(tiny, in_root("by pace"), &def);
+    train_ok(tiny, in_folder("by pace"), &def);
     def.stop_at_step = 30;
-    train_fails(tiny, in_root("by pace in two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    train_fails(tiny, in_folder("by pace in two"), &def, GBT_ERR_INTERRUPTED, "after step 30");
     gbt_train_def on = resume_def(0, def.budget_seconds);
     on.pace = def.pace;
-    train_ok(tiny, in_root("by pace in two"), &on);
-    assert_same_file(in_root("by pace/model.gbt"), in_root("by pace in two/model.gbt"));
+    train_ok(tiny, in_folder("by pace in two"), &on);
+    assert_same_file(in_folder("by pace/model.gbt"), in_folder("by pace in two/model.gbt"));
 }
 
 static void a_budget_that_reading_takes_is_told(void **state)
@@ -326,11 +326,11 @@ static void a_budget_that_reading_takes_is_told(void **state)
     gbt_train_def def = run_def();
     char warnings[PATH_SIZE] = "";
     gbt_listen(keep_warnings, warnings);
-    train_ok(tiny, in_root("enough"), &def);
+    train_ok(tiny, in_folder("enough"), &def);
     assert_string_equal(warnings, "");
     def.iterations = 0;
     def.budget_seconds = 1e-4;
-    train_ok(tiny, in_root("too little"), &def);
+    train_ok(tiny, in_folder("too little"), &def);
     be_quiet();
     if (strncmp(warnings, "budget: reading the data took ", 30) != 0 ||
         strstr(warnings, " of 0.0001 s (wanted at least ") == NULL)
@@ -342,21 +342,21 @@ static void what_a_run_left_alone_stays(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    train_ok(tiny, in_root("plain"), &def);
+    train_ok(tiny, in_folder("plain"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    train_fails(tiny, in_folder("asked"), &def, GBT_ERR_INTERRUPTED, "after step 30");
     gbt_train_def on = resume_def(STEPS, 0);
     on.views = 4;
     on.background = GBT_BACKGROUND_SKY;
     on.refine_poses = true;
     char warnings[PATH_SIZE] = "";
     gbt_listen(keep_warnings, warnings);
-    train_ok(tiny, in_root("asked"), &on);
+    train_ok(tiny, in_folder("asked"), &on);
     be_quiet();
     assert_string_equal(warnings, "a run is resumed with its own settings: views = 1, not 4\n"
                                   "a run is resumed with its own settings: background = constant, not sky\n"
                                   "a run is resumed with its own settings: refine-poses = 0, not 1\n");
-    assert_same_file(in_root("plain/model.gbt"), in_root("asked/model.gbt"));
+    assert_same_file(in_folder("plain/model.gbt"), in_folder("asked/model.gbt"));
 }
 
 /* What becomes of the list that was named, and where the run is gone on with, decides nothing. */
@@ -364,28 +364,28 @@ static void a_list_of_held_out_photos_is_the_runs_own(void **state)
 {
     (void)state;
     char split[PATH_SIZE], wanted[PATH_SIZE];
-    snprintf(split, sizeof split, "validate=3,list=%s", in_root("held.txt"));
-    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_root("list/held-out.txt"));
-    write_text(in_root("held.txt"), "0001.png\r\n\n0004.png");
+    snprintf(split, sizeof split, "validate=3,list=%s", in_folder("held.txt"));
+    snprintf(wanted, sizeof wanted, "\neval-split = validate=3,list=%s\n", in_folder("list/held-out.txt"));
+    write_text(in_folder("held.txt"), "0001.png\r\n\n0004.png");
     gbt_train_def def = run_def();
     def.eval_split = split;
-    train_ok(tiny, in_root("list straight"), &def);
+    train_ok(tiny, in_folder("list straight"), &def);
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
-    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
-    write_text(in_root("held.txt"), "0002.png\n");
+    train_fails(tiny, in_folder("list"), &def, GBT_ERR_INTERRUPTED, "after step 30");
+    assert_same_file(in_folder("held.txt"), in_folder("list/held-out.txt"));
+    write_text(in_folder("held.txt"), "0002.png\n");
     const gbt_train_def on = resume_def(0, 0);
-    train_ok(tiny, in_root("list"), &on);
-    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
-    bytes config = read_bytes(in_root("list/config"));
+    train_ok(tiny, in_folder("list"), &on);
+    assert_same_file(in_folder("list straight/model.gbt"), in_folder("list/model.gbt"));
+    file_bytes config = read_bytes(in_folder("list/config"));
     assert_non_null(strstr((const char *)config.data, wanted));
     mem_free(config.data);
     /* A run of an older version has none. */
-    assert_int_equal(remove(in_root("list/held-out.txt")), 0);
-    write_text(in_root("held.txt"), "0001.png\n0004.png\n");
-    train_ok(tiny, in_root("list"), &on);
-    assert_same_file(in_root("held.txt"), in_root("list/held-out.txt"));
-    assert_same_file(in_root("list straight/model.gbt"), in_root("list/model.gbt"));
+    assert_int_equal(remove(in_folder("list/held-out.txt")), 0);
+    write_text(in_folder("held.txt"), "0001.png\n0004.png\n");
+    train_ok(tiny, in_folder("list"), &on);
+    assert_same_file(in_folder("held.txt"), in_folder("list/held-out.txt"));
+    assert_same_file(in_folder("list straight/model.gbt"), in_folder("list/model.gbt"));
 }
 
 /* However the new run ends: here, before its first checkpoint. */
@@ -406,30 +406,31 @@ static void an_overwritten_run_is_gone(void **state)
     enum { OLD = sizeof old / sizeof *old };
     gbt_train_def def = run_def(), on = resume_def(0, 0);
     def.refine_poses = true;
-    train_ok(tiny, in_root("lost"), &def);
-    assert_ok(file_make_folder(in_root("lost/renders/test"), NULL));
+    train_ok(tiny, in_folder("lost"), &def);
+    assert_ok(file_make_folder(in_folder("lost/renders/test"), NULL));
     for (int i = 0; i < OLD; i++)
-        if (!file_exists(in_root("lost/%s", old[i])))
-            write_text(in_root("lost/%s", old[i]), "old");
-    write_text(in_root("lost/notes.txt"), "old");
+        if (!file_exists(in_folder("lost/%s", old[i])))
+            write_text(in_folder("lost/%s", old[i]), "old");
+    write_text(in_folder("lost/notes.txt"), "old");
     def = run_def();
     def.overwrite = true;
-    train_fails(in_root("no data"), in_root("lost"), &def, GBT_ERR_IO, "no data");
+    train_fails(in_folder("no data"), in_folder("lost"), &def, GBT_ERR_IO, "no data");
     for (int i = 0; i < OLD; i++)
-        assert_true(file_exists(in_root("lost/%s", old[i])));
-    assert_int_equal(remove(in_root("lost/log.csv")), 0); /* cannot be written where a folder is */
-    assert_ok(file_make_folder(in_root("lost/log.csv"), NULL));
-    train_fails(tiny, in_root("lost"), &def, GBT_ERR_IO, "log.csv");
+        assert_true(file_exists(in_folder("lost/%s", old[i])));
+    assert_int_equal(remove(in_folder("lost/log.csv")), 0); /* cannot be written where a folder is */
+    assert_ok(file_make_folder(in_folder("lost/log.csv"), NULL));
+    train_fails(tiny, in_folder("lost"), &def, GBT_ERR_IO, "log.csv");
     for (int i = 0; i < OLD; i++)
-        assert_false(file_exists(in_root("lost/%s", old[i])));
-    assert_true(file_exists(in_root("lost/notes.txt")));
-    train_fails(tiny, in_root("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+        assert_false(file_exists(in_folder("lost/%s", old[i])));
+    assert_true(file_exists(in_folder("lost/notes.txt")));
+    train_fails(tiny, in_folder("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
     /* Where there was no run, files of such names are somebody else's. */
-    write_text(in_root("lost/report.html"), "mine");
-    write_text(in_root("lost/renders/test/0.png"), "mine");
-    assert_int_equal(rmdir(in_root("lost/log.csv")), 0);
-    train_ok(tiny, in_root("lost"), &def);
-    assert_true(file_exists(in_root("lost/report.html")) && file_exists(in_root("lost/renders/test/0.png")));
+    write_text(in_folder("lost/report.html"), "mine");
+    write_text(in_folder("lost/renders/test/0.png"), "mine");
+    assert_int_equal(rmdir(in_folder("lost/log.csv")), 0);
+    train_ok(tiny, in_folder("lost"), &def);
+    assert_true(file_exists(in_folder("lost/report.html")) &&
+                file_exists(in_folder("lost/renders/test/0.png")));
 }
 
 int main(void)
@@ -452,5 +453,5 @@ int main(void)
         cmocka_unit_test(an_overwritten_run_is_gone),
         cmocka_unit_test(a_list_of_held_out_photos_is_the_runs_own),
     };
-    return cmocka_run_group_tests_name("resume", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("resume", tests, make_root, folder_remove);
 }

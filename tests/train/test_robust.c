@@ -43,7 +43,6 @@ static void copy_scene(const char *from, const char *folder, void (*change)(imag
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     assert_ok(scene_load(from, &split, &s, NULL));
     assert_ok(file_make_folder(joined(folder, "images"), NULL));
-    assert_ok(file_make_folder(joined(folder, "sparse/0"), NULL));
     static const char *const models[] = {"sparse/0/cameras.bin", "sparse/0/images.bin",
                                          "sparse/0/points3D.bin"};
     for (int i = 0; i < 3; i++)
@@ -76,17 +75,17 @@ static const char *poisoned_scene(void)
     static bool done = false;
     if (!done) {
         poison = NAN;
-        copy_scene(tiny, in_root("poisoned"), poison_one);
+        copy_scene(tiny, in_folder("poisoned"), poison_one);
         done = true;
     }
-    return in_root("poisoned");
+    return in_folder("poisoned");
 }
 
 /* ---- nothing that is not a number in any file ---- */
 
 static void assert_no_nan_in_text(const char *path)
 {
-    bytes b = read_bytes(path);
+    file_bytes b = read_bytes(path);
     const char *text = (const char *)b.data;
     static const char *const words[] = {"nan", "NaN", "inf", "Inf"};
     for (int i = 0; i < 4; i++)
@@ -178,7 +177,7 @@ static void wild_rates_and_photos_leave_no_nan(void **state)
         def.iterations = runs[i].steps, def.learning_rate_factor = runs[i].factor,
         def.exposure = runs[i].exposure, def.compat = runs[i].compat;
         def.distance = runs[i].distance;
-        const char *run = in_root("%s", runs[i].name);
+        const char *run = in_folder("%s", runs[i].name);
         train_ok(poisoned_scene(), run, &def);
         assert_sound(run, poisoned_scene());
         print_message("%s: %d of %d steps skipped\n", runs[i].name, (int)skipped_in(run), (int)runs[i].steps);
@@ -233,13 +232,13 @@ static void a_bad_pixel_has_no_say(void **state)
 {
     (void)state;
     gbt_train_def def = run_def();
-    train_ok(poisoned_scene(), in_root("nan"), &def);
+    train_ok(poisoned_scene(), in_folder("nan"), &def);
     poison = INFINITY;
-    copy_scene(tiny, in_root("infinite"), poison_one);
-    train_ok(in_root("infinite"), in_root("inf"), &def);
+    copy_scene(tiny, in_folder("infinite"), poison_one);
+    train_ok(in_folder("infinite"), in_folder("inf"), &def);
     model a, b;
-    assert_ok(model_load(in_root("nan/model.gbt"), &a, NULL));
-    assert_ok(model_load(in_root("inf/model.gbt"), &b, NULL));
+    assert_ok(model_load(in_folder("nan/model.gbt"), &a, NULL));
+    assert_ok(model_load(in_folder("inf/model.gbt"), &b, NULL));
     assert_int_equal(a.anchors.count, b.anchors.count);
     assert_memory_equal(a.anchors.feature, b.anchors.feature,
                         a.anchors.count * ANCHOR_FEATURE_DIM * sizeof(float));
@@ -248,8 +247,8 @@ static void a_bad_pixel_has_no_say(void **state)
     model_free(&a);
     model_free(&b);
     const gbt_evaluate_def score = gbt_evaluate_def_default();
-    assert_ok(gbt_evaluate(in_root("nan"), &score, NULL));
-    assert_int_equal(skipped_in(in_root("nan")), 0);
+    assert_ok(gbt_evaluate(in_folder("nan"), &score, NULL));
+    assert_int_equal(skipped_in(in_folder("nan")), 0);
 }
 
 /* ---- steps that teach nothing ---- */
@@ -353,7 +352,7 @@ static void skipped_steps_are_in_no_mean(void **state)
     run_log log;
     double psnr[4];
     open_ok(&t, tiny, &def);
-    assert_ok(run_log_open(&log, &t, in_root("skipped.csv"), in_root("skipped.events"), NULL));
+    assert_ok(run_log_open(&log, &t, in_folder("skipped.csv"), in_folder("skipped.events"), NULL));
     for (int i = 0; i < 4; i++) { /* bad, good, bad, good */
         const float background = t.settings.background[0];
         if (i % 2 == 0)
@@ -410,7 +409,7 @@ static void remove_photo(const gbt_event *event, void *context)
 static void a_photo_that_goes_ends_the_run_saved(void **state)
 {
     (void)state;
-    const char *folder = in_root("going"), *run = in_root("gone");
+    const char *folder = in_folder("going"), *run = in_folder("gone");
     scene s;
     make_tiny_scene(folder);
     assert_ok(scene_load(folder, NULL, &s, NULL));
@@ -645,7 +644,7 @@ static const char *copy_tiny(const char *name, const scene *s, size_t keep, doub
     static colmap_point points[POINTS_MOST];
     memset(pictures, 0, sizeof pictures);
     assert_true(s->view_count == VIEWS && keep <= POINTS_MOST);
-    const char *folder = in_root("%s", name);
+    const char *folder = in_folder("%s", name);
     assert_ok(file_make_folder(folder, NULL));
     assert_int_equal(symlink("../tiny/images", joined(folder, "images")), 0);
     for (size_t v = 0; v < VIEWS; v++) {
@@ -718,8 +717,8 @@ static void they_are_forgotten_by_all(void **state)
     const gbt_train_def def = run_def();
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
     assert_ok(scene_load(tiny, &split, &s, NULL));
-    train_ok(copy_tiny("elsewhere", &s, 150, 1, 1e4), in_root("lost"), &def);
-    assert_ok(loaded_run_open(in_root("lost"), NULL, 0, &run, NULL));
+    train_ok(copy_tiny("elsewhere", &s, 150, 1, 1e4), in_folder("lost"), &def);
+    assert_ok(loaded_run_open(in_folder("lost"), NULL, 0, &run, NULL));
     assert_true(run.scene.points.count == 0);
     assert_true(loaded_run_settings(&run, 0).t_near == run.settings.t_near);
     loaded_run_close(&run);
@@ -919,20 +918,21 @@ static void exposure_is_learned(void **state)
     make.view_count = 20;
     make.points = 800;
     make.samples = 4;
-    assert_ok(gbt_make_scene(&make, in_root("even"), NULL));
-    copy_scene(in_root("even"), in_root("exposed"), expose);
+    assert_ok(gbt_make_scene(&make, in_folder("even"), NULL));
+    copy_scene(in_folder("even"), in_folder("exposed"), expose);
     gbt_train_def def = run_def();
     def.iterations = 400;
     def.find_exposure = false;
-    const double without = score_of(in_root("without"), in_root("exposed"), def);
+    const double without = score_of(in_folder("without"), in_folder("exposed"), def);
     def.exposure = true;
-    const double with = score_of(in_root("with"), in_root("exposed"), def);
+    const double with = score_of(in_folder("with"), in_folder("exposed"), def);
     print_message("held-out PSNR %.2f dB without, %.2f dB with exposure\n", without, with);
     assert_true(with >= without + 10);
-    assert_true(file_exists(in_root("with/exposure.json")) && !file_exists(in_root("without/exposure.json")));
+    assert_true(file_exists(in_folder("with/exposure.json")) &&
+                !file_exists(in_folder("without/exposure.json")));
 
     /* The mean of the matrices is the identity, and each shows its photo's factor. */
-    json_t *file = json_load_file(in_root("with/exposure.json"), 0, NULL);
+    json_t *file = json_load_file(in_folder("with/exposure.json"), 0, NULL);
     const json_t *list = json_object_get(file, "photos");
     double sum[AFFINE_NUMBERS] = {0};
     for (size_t i = 0; i < json_array_size(list); i++)
@@ -959,17 +959,17 @@ static void sky_and_poses_are_scored(void **state)
     def.iterations = 200;
     def.footprint = 0; /* no smallest pixels, of which only eval knows */
     def.background = GBT_BACKGROUND_SKY;
-    score_of(in_root("sky"), tiny, def);
+    score_of(in_folder("sky"), tiny, def);
     def.background = GBT_BACKGROUND_CONSTANT;
     def.refine_poses = true;
     int warned = 0;
     gbt_listen(count_unaligned, &warned);
-    score_of(in_root("refined"), tiny, def);
+    score_of(in_folder("refined"), tiny, def);
     assert_int_equal(warned, 0);
     def.stop_at_step = 3;
-    train_fails(tiny, in_root("refined half"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    train_fails(tiny, in_folder("refined half"), &def, GBT_ERR_INTERRUPTED, "stopped");
     const gbt_evaluate_def score = gbt_evaluate_def_default();
-    assert_ok(gbt_evaluate(in_root("refined half"), &score, NULL));
+    assert_ok(gbt_evaluate(in_folder("refined half"), &score, NULL));
     be_quiet();
     assert_int_equal(warned, 1);
 }
@@ -981,16 +981,17 @@ static void exposure_resumes_to_the_same_bits(void **state)
     const int before = parallel_threads();
     gbt_train_def def = run_def();
     def.exposure = true;
-    train_ok(tiny, in_root("exposure straight"), &def);
+    train_ok(tiny, in_folder("exposure straight"), &def);
     def.stop_at_step = 23;
-    train_fails(tiny, in_root("exposure halves"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
+    train_fails(tiny, in_folder("exposure halves"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
     gbt_train_def more = gbt_train_def_default();
     more.resume = true;
     gbt_set_threads(3);
-    train_ok(tiny, in_root("exposure halves"), &more);
+    train_ok(tiny, in_folder("exposure halves"), &more);
     gbt_set_threads(before);
-    assert_same_file(in_root("exposure straight/model.gbt"), in_root("exposure halves/model.gbt"));
-    assert_same_file(in_root("exposure straight/exposure.json"), in_root("exposure halves/exposure.json"));
+    assert_same_file(in_folder("exposure straight/model.gbt"), in_folder("exposure halves/model.gbt"));
+    assert_same_file(in_folder("exposure straight/exposure.json"),
+                     in_folder("exposure halves/exposure.json"));
 }
 
 static void signal_at_warning(const gbt_event *event, void *context)
@@ -1014,16 +1015,16 @@ static void train_for_a_signal(const char *run)
 static void making_small_stops_at_a_signal(void **state)
 {
     (void)state;
-    const char *run = in_root("large");
+    const char *run = in_folder("large");
     const gbt_compress_def small = gbt_compress_def_default();
     gbt_error err = {0};
     train_for_a_signal(run);
-    assert_int_equal(gbt_compress(run, &small, in_root("small.gbt"), NULL, &err), GBT_ERR_INTERRUPTED);
+    assert_int_equal(gbt_compress(run, &small, in_folder("small.gbt"), NULL, &err), GBT_ERR_INTERRUPTED);
     be_quiet();
     assert_string_equal(err.text, "stopped while the model was made small (compress, or resume of a "
                                   "training, does it again)");
-    assert_false(file_exists(in_root("small.gbt")));
-    assert_ok(gbt_compress(run, &small, in_root("small.gbt"), NULL, NULL));
+    assert_false(file_exists(in_folder("small.gbt")));
+    assert_ok(gbt_compress(run, &small, in_folder("small.gbt"), NULL, NULL));
 }
 
 static void a_far_anchor_does_not_move_the_others(void **state)
@@ -1031,17 +1032,17 @@ static void a_far_anchor_does_not_move_the_others(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.iterations = 3;
-    train_ok(tiny, in_root("stray"), &def);
+    train_ok(tiny, in_folder("stray"), &def);
     for (int far = 0; far < 2; far++) {
         const gbt_compress_def small = gbt_compress_def_default();
         model m, back;
-        assert_ok(model_load(in_root("stray/model.gbt"), &m, NULL));
+        assert_ok(model_load(in_folder("stray/model.gbt"), &m, NULL));
         if (far == 1) {
             m.anchors.position[0] += 1e6f * m.extent;
-            assert_ok(model_save(in_root("stray/model.gbt"), &m, NULL));
+            assert_ok(model_save(in_folder("stray/model.gbt"), &m, NULL));
         }
-        assert_ok(gbt_compress(in_root("stray"), &small, in_root("stray.gbt"), NULL, NULL));
-        assert_ok(model_load(in_root("stray.gbt"), &back, NULL));
+        assert_ok(gbt_compress(in_folder("stray"), &small, in_folder("stray.gbt"), NULL, NULL));
+        assert_ok(model_load(in_folder("stray.gbt"), &back, NULL));
         const size_t size = 3 * m.anchors.count * sizeof(float);
         assert_int_equal(back.anchors.count, m.anchors.count);
         assert_true((memcmp(back.anchors.position, m.anchors.position, size) == 0) == (far == 1));
@@ -1053,7 +1054,7 @@ static void a_far_anchor_does_not_move_the_others(void **state)
 static void scoring_stops_at_a_signal(void **state)
 {
     (void)state;
-    const char *run = in_root("unscored");
+    const char *run = in_folder("unscored");
     const gbt_evaluate_def score = gbt_evaluate_def_default();
     gbt_error err = {0};
     train_for_a_signal(run);
@@ -1116,5 +1117,5 @@ int main(void)
         cmocka_unit_test(scoring_stops_at_a_signal),
         cmocka_unit_test(scoring_in_passing_stops_at_a_signal),
     };
-    return cmocka_run_group_tests_name("robust training", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("robust training", tests, make_root, folder_remove);
 }

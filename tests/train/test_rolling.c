@@ -52,15 +52,15 @@ static double trained(const char *data, bool still)
 static void motion_is_followed(void **state)
 {
     (void)state;
-    make_rolling_scene(in_root("rolling"));
-    const double own = trained(in_root("rolling"), false), still = trained(in_root("rolling"), true);
+    make_rolling_scene(in_folder("rolling"));
+    const double own = trained(in_folder("rolling"), false), still = trained(in_folder("rolling"), true);
     print_message("%.2f dB by their own rays, %.2f dB as if they stood still\n", own, still);
     assert_true(own > still + 1);
     const gbt_train_def def = rolling_def();
     const gbt_evaluate_def score = gbt_evaluate_def_default();
-    train_ok(in_root("rolling"), in_root("run"), &def);
-    assert_ok(gbt_evaluate(in_root("run"), &score, NULL));
-    json_t *metrics = json_load_file(in_root("run/metrics.json"), 0, NULL);
+    train_ok(in_folder("rolling"), in_folder("run"), &def);
+    assert_ok(gbt_evaluate(in_folder("run"), &score, NULL));
+    json_t *metrics = json_load_file(in_folder("run/metrics.json"), 0, NULL);
     assert_near(json_number_value(json_object_get(metrics, "psnr")), own, 0.01); /* of 8-bit images */
     json_decref(metrics);
 }
@@ -68,5 +68,5 @@ static void motion_is_followed(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(motion_is_followed)};
-    return cmocka_run_group_tests_name("rolling shutters", tests, make_root, remove_root);
+    return cmocka_run_group_tests_name("rolling shutters", tests, make_root, folder_remove);
 }

@@ -106,12 +106,12 @@ static void threads_do_not_matter(void **state)
     def.exposure = true;
     for (int threads = 1; threads <= 3; threads += 2) {
         gbt_set_threads(threads);
-        train_ok(tiny, in_root("threads-%d", threads), &def);
+        train_ok(tiny, in_folder("threads-%d", threads), &def);
     }
-    assert_same_file(in_root("threads-1/model.gbt"), in_root("threads-3/model.gbt"));
+    assert_same_file(in_folder("threads-1/model.gbt"), in_folder("threads-3/model.gbt"));
     def.views = 1;
-    train_ok(tiny, in_root("alone"), &def);
-    assert_false(is_same_file(in_root("threads-1/model.gbt"), in_root("alone/model.gbt")));
+    train_ok(tiny, in_folder("alone"), &def);
+    assert_false(is_same_file(in_folder("threads-1/model.gbt"), in_folder("alone/model.gbt")));
 }
 
 /* V steps of one view forget as much as one step of V. */
@@ -219,7 +219,7 @@ static void views_are_a_power_of_two(void **state)
         gbt_train_def def = run_def();
         gbt_error err = {0};
         def.views = bad[i];
-        assert_int_equal(gbt_train(tiny, in_root("refused"), &def, &err), GBT_ERR_ARGUMENT);
+        assert_int_equal(gbt_train(tiny, in_folder("refused"), &def, &err), GBT_ERR_ARGUMENT);
         assert_true(strncmp(err.text, "views: ", 7) == 0);
     }
 }
@@ -232,5 +232,5 @@ int main(void)
         cmocka_unit_test(rates_follow_the_views),        cmocka_unit_test(rounds_count_views),
         cmocka_unit_test(views_are_a_power_of_two),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

@@ -38,10 +38,10 @@ static const char *straight_run(void)
     static bool done = false;
     if (!done) {
         const gbt_train_def def = run_def();
-        train_ok(tiny, in_root("straight"), &def);
+        train_ok(tiny, in_folder("straight"), &def);
         done = true;
     }
-    return in_root("straight/model.gbt");
+    return in_folder("straight/model.gbt");
 }
 
 static void resume_ok(const char *run)
@@ -116,14 +116,14 @@ static void interrupted_and_resumed_is_straight(void **state)
     (void)state;
     straight_run();
     model m;
-    assert_ok(model_load(in_root("straight/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("straight/model.gbt"), &m, NULL));
     trainer t;
     const gbt_train_def whole = run_def();
     open_ok(&t, tiny, &whole);
     assert_true(m.anchors.count != t.anchors.count); /* it grows, so that there is something to get wrong */
     trainer_free(&t);
     model_free(&m);
-    const char *run = in_root("pieces");
+    const char *run = in_folder("pieces");
     static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, around resolutions, at the
                                                                   ends */
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
@@ -133,9 +133,9 @@ static void interrupted_and_resumed_is_straight(void **state)
         train_fails(tiny, run, &def, GBT_ERR_INTERRUPTED, "saved in");
     }
     resume_ok(run);
-    assert_same_file(straight_run(), in_root("pieces/model.gbt"));
+    assert_same_file(straight_run(), in_folder("pieces/model.gbt"));
     resume_ok(run); /* a finished run has nothing left to do */
-    assert_same_file(straight_run(), in_root("pieces/model.gbt"));
+    assert_same_file(straight_run(), in_folder("pieces/model.gbt"));
 }
 
 static void extra_checkpoints_change_nothing(void **state)
@@ -143,9 +143,9 @@ static void extra_checkpoints_change_nothing(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.save_every_seconds = 1e-6;
-    train_ok(tiny, in_root("saves"), &def);
-    assert_same_file(straight_run(), in_root("saves/model.gbt"));
-    assert_true(file_exists(in_root("saves/checkpoints/last.gbt.prev")));
+    train_ok(tiny, in_folder("saves"), &def);
+    assert_same_file(straight_run(), in_folder("saves/model.gbt"));
+    assert_true(file_exists(in_folder("saves/checkpoints/last.gbt.prev")));
 }
 
 /* The copy that was written while steps went on has all that the run had. */
@@ -155,11 +155,11 @@ static void resumes_from_a_save_beside_the_steps(void **state)
     gbt_train_def def = run_def();
     def.save_every_seconds = 1e-6;
     def.stop_at_step = 29; /* before anchors grow; it saves, and the copy before it stays */
-    train_fails(tiny, in_root("beside"), &def, GBT_ERR_INTERRUPTED, "after step 29");
-    assert_int_equal(remove(in_root("beside/checkpoints/last.gbt")), 0);
-    assert_int_equal(remove(in_root("beside/model.gbt")), 0);
-    resume_ok(in_root("beside"));
-    assert_same_file(straight_run(), in_root("beside/model.gbt"));
+    train_fails(tiny, in_folder("beside"), &def, GBT_ERR_INTERRUPTED, "after step 29");
+    assert_int_equal(remove(in_folder("beside/checkpoints/last.gbt")), 0);
+    assert_int_equal(remove(in_folder("beside/model.gbt")), 0);
+    resume_ok(in_folder("beside"));
+    assert_same_file(straight_run(), in_folder("beside/model.gbt"));
 }
 
 /* What steps change beside the anchors is the copy's own. */
@@ -175,10 +175,10 @@ static void a_save_has_its_own_exposures_and_poses(void **state)
     open_ok(&t, tiny, &def);
     for (int i = 0; i < 2; i++)
         step_ok(&t, &r);
-    snprintf(paths.checkpoint, sizeof paths.checkpoint, "%s", in_root("copy.checkpoint"));
-    snprintf(paths.exposure, sizeof paths.exposure, "%s", in_root("copy.exposure.json"));
-    snprintf(paths.poses, sizeof paths.poses, "%s", in_root("copy.poses.json"));
-    snprintf(paths.model, sizeof paths.model, "%s", in_root("copy.gbt"));
+    snprintf(paths.checkpoint, sizeof paths.checkpoint, "%s", in_folder("copy.checkpoint"));
+    snprintf(paths.exposure, sizeof paths.exposure, "%s", in_folder("copy.exposure.json"));
+    snprintf(paths.poses, sizeof paths.poses, "%s", in_folder("copy.poses.json"));
+    snprintf(paths.model, sizeof paths.model, "%s", in_folder("copy.gbt"));
     assert_ok(save_begin(&save, &t, &paths, NULL));
     const exposures *e = &t.exposures, *e2 = &save.copy.exposures;
     const poses *p = &t.poses, *p2 = &save.copy.poses;
@@ -210,11 +210,11 @@ static void killed_and_resumed_is_straight(void **state)
 {
     (void)state;
     for (int i = 0; i < 3; i++) {
-        const char *run = in_root("killed%d", i);
+        const char *run = in_folder("killed%d", i);
         const int status = signal_when_saved(run, SIGKILL);
         assert_true(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
         resume_ok(run);
-        assert_same_file(straight_run(), in_root("killed%d/model.gbt", i));
+        assert_same_file(straight_run(), in_folder("killed%d/model.gbt", i));
     }
 }
 
@@ -224,11 +224,12 @@ static void resumes_from_the_previous_checkpoint(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.stop_at_step = 20;
-    train_fails(tiny, in_root("previous"), &def, GBT_ERR_INTERRUPTED, "after step 20");
+    train_fails(tiny, in_folder("previous"), &def, GBT_ERR_INTERRUPTED, "after step 20");
     assert_int_equal(
-        rename(in_root("previous/checkpoints/last.gbt"), in_root("previous/checkpoints/last.gbt.prev")), 0);
-    resume_ok(in_root("previous"));
-    assert_same_file(straight_run(), in_root("previous/model.gbt"));
+        rename(in_folder("previous/checkpoints/last.gbt"), in_folder("previous/checkpoints/last.gbt.prev")),
+        0);
+    resume_ok(in_folder("previous"));
+    assert_same_file(straight_run(), in_folder("previous/model.gbt"));
 }
 
 static void a_signal_saves_and_ends(void **state)
@@ -236,18 +237,18 @@ static void a_signal_saves_and_ends(void **state)
     (void)state;
     static const int numbers[] = {SIGINT, SIGTERM};
     for (int i = 0; i < 2; i++) {
-        const int status = signal_when_saved(in_root("signal%d", i), numbers[i]);
+        const int status = signal_when_saved(in_folder("signal%d", i), numbers[i]);
         assert_true(WIFEXITED(status));
         assert_int_equal(WEXITSTATUS(status), 130);
         trainer t = {0};
         const gbt_train_def def = run_def();
         gbt_error err = {0};
         assert_ok(trainer_open(&t, tiny, &def, &err));
-        assert_ok(checkpoint_load(&t, in_root("signal%d/checkpoints/last.gbt", i), &err));
+        assert_ok(checkpoint_load(&t, in_folder("signal%d/checkpoints/last.gbt", i), &err));
         assert_in_range(t.step, 1, STEPS - 1);
         trainer_free(&t);
-        resume_ok(in_root("signal%d", i));
-        assert_same_file(straight_run(), in_root("signal%d/model.gbt", i));
+        resume_ok(in_folder("signal%d", i));
+        assert_same_file(straight_run(), in_folder("signal%d/model.gbt", i));
     }
 }
 
@@ -281,8 +282,8 @@ static void threads_and_memory_do_not_change_bits(void **state)
         const gbt_train_def def = run_def();
         if (threads == 3) /* anchors in files, whose pages are let go of all the time */
             assert_ok(paged_start("/tmp", 1, NULL));
-        train_ok(tiny, in_root("threads%d", threads), &def);
-        assert_same_file(straight_run(), in_root("threads%d/model.gbt", threads));
+        train_ok(tiny, in_folder("threads%d", threads), &def);
+        assert_same_file(straight_run(), in_folder("threads%d/model.gbt", threads));
     }
     gbt_set_threads(before);
 }
@@ -293,10 +294,10 @@ static void more_memory_than_allowed(void **state)
     gbt_train_def def = run_def();
     gbt_error err = {0};
     def.memory = 1 << 20; /* less than it can be: told before any work */
-    assert_int_equal(gbt_train(tiny, in_root("limit"), &def, &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(gbt_train(tiny, in_folder("limit"), &def, &err), GBT_ERR_NO_MEMORY);
     assert_non_null(strstr(err.text, "memory: 1 MiB is too little: "));
-    assert_false(file_exists(in_root("limit/model.gbt")) ||
-                 file_exists(in_root("limit/checkpoints/last.gbt")));
+    assert_false(file_exists(in_folder("limit/model.gbt")) ||
+                 file_exists(in_folder("limit/checkpoints/last.gbt")));
 
     const size_t other = 400 << 20; /* that somebody else takes in this process */
     char *taken = mem_alloc(other, 1, "test", NULL);
@@ -306,12 +307,12 @@ static void more_memory_than_allowed(void **state)
     mem_free(taken);
     def.memory = 300 << 20;
     err = (gbt_error){0};
-    assert_int_equal(gbt_train(tiny, in_root("limit"), &def, &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(gbt_train(tiny, in_folder("limit"), &def, &err), GBT_ERR_NO_MEMORY);
     if (strstr(err.text, "memory: 300 MiB is too little: ") == NULL)
         fail_msg("%s", err.text);
     assert_non_null(strstr(err.text, "after step 1; saved in "));
-    resume_ok(in_root("limit")); /* it was saved, and goes on with more */
-    assert_same_file(straight_run(), in_root("limit/model.gbt"));
+    resume_ok(in_folder("limit")); /* it was saved, and goes on with more */
+    assert_same_file(straight_run(), in_folder("limit/model.gbt"));
 }
 
 static void another_seed_changes_bits(void **state)
@@ -322,11 +323,11 @@ static void another_seed_changes_bits(void **state)
     static const uint64_t seeds[] = {5, 6};
     for (int i = 0; i < 2; i++) {
         def.seed = seeds[i];
-        train_ok(tiny, in_root("seed%d", i), &def);
+        train_ok(tiny, in_folder("seed%d", i), &def);
     }
     model a, b;
-    assert_ok(model_load(in_root("seed0/model.gbt"), &a, NULL));
-    assert_ok(model_load(in_root("seed1/model.gbt"), &b, NULL));
+    assert_ok(model_load(in_folder("seed0/model.gbt"), &a, NULL));
+    assert_ok(model_load(in_folder("seed1/model.gbt"), &b, NULL));
     assert_int_equal(a.decoder.param_count, b.decoder.param_count);
     assert_true(memcmp(a.decoder.params, b.decoder.params, a.decoder.param_count * sizeof(float)) != 0);
     model_free(&a);
@@ -352,9 +353,9 @@ static void a_budget_run_can_be_repeated(void **state)
     def.budget_seconds = 1;
     def.eval_at_seconds[0] = 0.3;
     def.eval_at_count = 1;
-    train_ok(tiny, in_root("budget"), &def);
+    train_ok(tiny, in_folder("budget"), &def);
 
-    json_t *summary = read_summary(in_root("budget"));
+    json_t *summary = read_summary(in_folder("budget"));
     const json_t *parts = json_object_get(summary, "pace"), *held_out = json_object_get(summary, "held_out");
     assert_int_equal(json_array_size(parts), PACE_SEGMENTS);
     char text[512] = "";
@@ -377,9 +378,9 @@ static void a_budget_run_can_be_repeated(void **state)
     gbt_train_def again = run_def();
     again.iterations = 0;
     again.pace = text;
-    train_ok(tiny, in_root("pace"), &again);
-    assert_same_file(in_root("budget/model.gbt"), in_root("pace/model.gbt"));
-    json_t *repeated = read_summary(in_root("pace"));
+    train_ok(tiny, in_folder("pace"), &again);
+    assert_same_file(in_folder("budget/model.gbt"), in_folder("pace/model.gbt"));
+    json_t *repeated = read_summary(in_folder("pace"));
     assert_int_equal(json_integer_value(json_object_get(repeated, "iterations")), sum);
     json_decref(repeated);
 }
@@ -392,19 +393,19 @@ static void a_decimal_comma_changes_no_file(void **state)
     gbt_train_def def = run_def();
     straight_run();
     def.stop_at_step = STEPS / 2;
-    train_fails(tiny, in_root("comma"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    train_fails(tiny, in_folder("comma"), &def, GBT_ERR_INTERRUPTED, "stopped");
     snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 '%s' >/dev/null 2>&1",
-             in_root("de_DE.UTF-8"));
-    if (system(command) != 0 || setenv("LOCPATH", in_root("."), 1) != 0 ||
+             in_folder("de_DE.UTF-8"));
+    if (system(command) != 0 || setenv("LOCPATH", in_folder("."), 1) != 0 ||
         setlocale(LC_ALL, "de_DE.UTF-8") == NULL)
         skip();
-    resume_ok(in_root("comma"));
-    make_tiny_scene(in_root("comma_scene"));
+    resume_ok(in_folder("comma"));
+    make_tiny_scene(in_folder("comma_scene"));
     setlocale(LC_ALL, "C");
     unsetenv("LOCPATH");
-    assert_same_file(straight_run(), in_root("comma/model.gbt"));
-    assert_same_file(in_root("straight/config"), in_root("comma/config"));
-    assert_same_file(in_root("tiny/SCENE.md"), in_root("comma_scene/SCENE.md"));
+    assert_same_file(straight_run(), in_folder("comma/model.gbt"));
+    assert_same_file(in_folder("straight/config"), in_folder("comma/config"));
+    assert_same_file(in_folder("tiny/SCENE.md"), in_folder("comma_scene/SCENE.md"));
 }
 
 /* Steps take a time of their own, most of it in reading photos, and one per pixel, of a finer picture half of
@@ -459,18 +460,18 @@ static void a_budget_run_resumes_its_clock(void **state)
     def.iterations = 0;
     def.budget_seconds = 1e6;
     def.stop_at_step = 10; /* in the first part */
-    train_fails(tiny, in_root("clock"), &def, GBT_ERR_INTERRUPTED, "after step 10");
+    train_fails(tiny, in_folder("clock"), &def, GBT_ERR_INTERRUPTED, "after step 10");
     def.stop_at_step = 0;
     trainer t;
     open_ok(&t, tiny, &def);
-    assert_ok(checkpoint_load(&t, in_root("clock/checkpoints/last.gbt"), NULL));
+    assert_ok(checkpoint_load(&t, in_folder("clock/checkpoints/last.gbt"), NULL));
     const uint64_t first_part = t.pace.steps[0];
     assert_true(t.seconds > 0);
     t.seconds = 1e6;
-    assert_ok(checkpoint_save(&t, in_root("clock/checkpoints/last.gbt"), NULL));
+    assert_ok(checkpoint_save(&t, in_folder("clock/checkpoints/last.gbt"), NULL));
     trainer_free(&t);
-    resume_ok(in_root("clock"));
-    json_t *summary = read_summary(in_root("clock"));
+    resume_ok(in_folder("clock"));
+    json_t *summary = read_summary(in_folder("clock"));
     assert_int_equal(json_array_size(json_object_get(summary, "pace")), PACE_SEGMENTS);
     assert_true(json_number_value(json_object_get(summary, "train_seconds")) > 1e6);
     assert_int_equal(json_integer_value(json_object_get(summary, "iterations")),
@@ -817,7 +818,7 @@ static void write_transforms(const char *folder)
 static void points_are_made_where_there_are_none(void **state)
 {
     (void)state;
-    const char *folder = in_root("no_points");
+    const char *folder = in_folder("no_points");
     write_transforms(folder);
     scene s;
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
@@ -859,7 +860,7 @@ static void points_are_made_where_there_are_none(void **state)
     for (size_t i = 0; i < MANY; i++)
         many[i] = i % 2 == 0 ? i / 2 % ABSENT : ABSENT;
     char *path = s.views[ABSENT].path;
-    s.views[ABSENT].path = (char *)in_root("absent.png");
+    s.views[ABSENT].path = (char *)in_folder("absent.png");
     scene_points of_many = {0};
     photos p;
     assert_ok(photos_open(&p, &s, 1, NULL));
@@ -878,13 +879,13 @@ static void points_are_made_where_there_are_none(void **state)
     gbt_train_def def = run_def();
     def.iterations = 4;
     def.max_anchors = 20000;
-    train_ok(folder, in_root("made"), &def);
+    train_ok(folder, in_folder("made"), &def);
     def.stop_at_step = 2;
-    train_fails(folder, in_root("made2"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    train_fails(folder, in_folder("made2"), &def, GBT_ERR_INTERRUPTED, "after step 2");
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
-    train_ok(folder, in_root("made2"), &on);
-    assert_same_file(in_root("made/model.gbt"), in_root("made2/model.gbt"));
+    train_ok(folder, in_folder("made2"), &on);
+    assert_same_file(in_folder("made/model.gbt"), in_folder("made2/model.gbt"));
 }
 
 /* Smooth noise. */
@@ -905,8 +906,8 @@ static void write_wall(void)
     enum { WIDTH = 64, HEIGHT = 48, FOCAL = 64 };
     image photo;
     assert_ok(image_alloc(&photo, WIDTH, HEIGHT, 3, NULL));
-    assert_ok(file_make_folder(in_root("wall"), NULL));
-    FILE *file = fopen(in_root("wall/transforms.json"), "w");
+    assert_ok(file_make_folder(in_folder("wall"), NULL));
+    FILE *file = fopen(in_folder("wall/transforms.json"), "w");
     assert_non_null(file);
     fprintf(file, "{\"w\": %d, \"h\": %d, \"fl_x\": %d, \"fl_y\": %d, \"cx\": %d, \"cy\": %d, \"frames\": [",
             WIDTH, HEIGHT, FOCAL, FOCAL, WIDTH / 2, HEIGHT / 2);
@@ -915,7 +916,7 @@ static void write_wall(void)
         for (int i = 0; i < 3 * WIDTH * HEIGHT; i++)
             photo.pixels[i] = wall_color(x + (i / 3 % WIDTH + 0.5 - WIDTH / 2) * step,
                                          y + (i / 3 / WIDTH + 0.5 - HEIGHT / 2) * step);
-        assert_ok(image_write(in_root("wall/%d.png", view), &photo, NULL));
+        assert_ok(image_write(in_folder("wall/%d.png", view), &photo, NULL));
         fprintf(file,
                 "%s{\"file_path\": \"%d.png\", \"transform_matrix\": [[1, 0, 0, %g], [0, -1, 0, %g], "
                 "[0, 0, -1, 0], [0, 0, 0, 1]]}",
@@ -936,7 +937,7 @@ static void points_are_made_where_axes_do_not_meet(void **state)
     scene_points made = {0};
     size_t views[WALL_VIEWS];
     const scene_split split = {.kind = SCENE_SPLIT_NONE};
-    assert_ok(scene_load(in_root("wall"), &split, &s, NULL));
+    assert_ok(scene_load(in_folder("wall"), &split, &s, NULL));
     assert_int_equal(s.view_count, WALL_VIEWS);
     for (size_t i = 0; i < WALL_VIEWS; i++)
         views[i] = i;
@@ -963,17 +964,17 @@ static void closed_folders_are_told_first(void **state)
     if (geteuid() == 0) /* who may write everywhere */
         skip();
     gbt_train_def def = run_def();
-    const char *closed = in_root("closed/checkpoints");
+    const char *closed = in_folder("closed/checkpoints");
     assert_ok(file_make_folder(closed, NULL));
     assert_int_equal(chmod(closed, 0555), 0);
-    train_fails(in_root("nowhere"), in_root("closed"), &def, GBT_ERR_IO, "checkpoints: cannot create");
+    train_fails(in_folder("nowhere"), in_folder("closed"), &def, GBT_ERR_IO, "checkpoints: cannot create");
     assert_int_equal(chmod(closed, 0755), 0);
 }
 
 static void data_without_training_photos_is_refused(void **state)
 {
     (void)state;
-    FILE *list = fopen(in_root("all.txt"), "w");
+    FILE *list = fopen(in_folder("all.txt"), "w");
     assert_non_null(list);
     scene s;
     const scene_split none = {.kind = SCENE_SPLIT_NONE};
@@ -983,27 +984,27 @@ static void data_without_training_photos_is_refused(void **state)
     fclose(list);
     scene_free(&s);
     char split[PATH_SIZE];
-    snprintf(split, sizeof split, "list=%s", in_root("all.txt"));
+    snprintf(split, sizeof split, "list=%s", in_folder("all.txt"));
     gbt_train_def def = run_def();
     def.eval_split = split;
-    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
+    train_fails(tiny, in_folder("none"), &def, GBT_ERR_ARGUMENT, "none is left to train on");
     def = run_def();
-    train_fails(in_root("nowhere"), in_root("none"), &def, GBT_ERR_IO, "nowhere");
-    train_fails(NULL, in_root("without"), &def, GBT_ERR_ARGUMENT, "train: no data given");
-    assert_false(file_exists(in_root("without")));
+    train_fails(in_folder("nowhere"), in_folder("none"), &def, GBT_ERR_IO, "nowhere");
+    train_fails(NULL, in_folder("without"), &def, GBT_ERR_ARGUMENT, "train: no data given");
+    assert_false(file_exists(in_folder("without")));
     char two_lines[PATH_SIZE], long_name[PATH_SIZE * 2 + 1];
-    snprintf(two_lines, sizeof two_lines, "%s", in_root("two\nlines"));
+    snprintf(two_lines, sizeof two_lines, "%s", in_folder("two\nlines"));
     make_tiny_scene(two_lines); /* no run could be opened again that names this */
-    train_fails(two_lines, in_root("none"), &def, GBT_ERR_ARGUMENT, "data: has a line break");
+    train_fails(two_lines, in_folder("none"), &def, GBT_ERR_ARGUMENT, "data: has a line break");
     memset(long_name, 'x', 2 * PATH_SIZE);
     long_name[2 * PATH_SIZE] = '\0';
-    train_fails(long_name, in_root("none"), &def, GBT_ERR_ARGUMENT, "1024 bytes (wanted at most 1023)");
+    train_fails(long_name, in_folder("none"), &def, GBT_ERR_ARGUMENT, "1024 bytes (wanted at most 1023)");
     def.eval_split = "list=two\nlines";
-    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "eval_split: has a line break");
+    train_fails(tiny, in_folder("none"), &def, GBT_ERR_ARGUMENT, "eval_split: has a line break");
     def = run_def();
     def.cookie_ = 0;
-    train_fails(tiny, in_root("none"), &def, GBT_ERR_ARGUMENT, "gbt_train_def_default");
-    assert_false(file_exists(in_root("none/model.gbt")));
+    train_fails(tiny, in_folder("none"), &def, GBT_ERR_ARGUMENT, "gbt_train_def_default");
+    assert_false(file_exists(in_folder("none/model.gbt")));
 }
 
 /* Validation scores training photos, and does not so much as open the held-out ones. */
@@ -1011,8 +1012,8 @@ static void validation_needs_no_held_out_photo(void **state)
 {
     (void)state;
     scene s;
-    make_tiny_scene(in_root("validate"));
-    assert_ok(scene_load(in_root("validate"), NULL, &s, NULL));
+    make_tiny_scene(in_folder("validate"));
+    assert_ok(scene_load(in_folder("validate"), NULL, &s, NULL));
     size_t held_out = 0;
     for (size_t i = 0; i < s.view_count; i++)
         if (s.views[i].is_test) {
@@ -1030,7 +1031,7 @@ static void validation_needs_no_held_out_photo(void **state)
         trainer t;
         step_report r;
         double psnr = 0;
-        open_ok(&t, in_root("validate"), &def);
+        open_ok(&t, in_folder("validate"), &def);
         assert_int_equal(t.scene.view_count, others);
         assert_int_equal(t.test_count, (others - (size_t)fold + 3) / 4);
         assert_int_equal(t.train_count, others - t.test_count);
@@ -1045,58 +1046,58 @@ static void a_run_is_overwritten_only_when_asked(void **state)
 {
     (void)state;
     static const char *const files[] = {"model.gbt", "config", "log.csv", "checkpoints/last.gbt"};
-    bytes before[4];
+    file_bytes before[4];
     gbt_train_def def = run_def();
     def.iterations = 3;
     def.stop_at_step = 2;
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_INTERRUPTED, "after step 2");
     for (int i = 0; i < 4; i++)
-        before[i] = read_bytes(in_root("kept/%s", files[i]));
+        before[i] = read_bytes(in_folder("kept/%s", files[i]));
     def.seed = 6;
     def.stop_at_step = 0;
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
     for (int i = 0; i < 4; i++) {
-        bytes after = read_bytes(in_root("kept/%s", files[i]));
+        file_bytes after = read_bytes(in_folder("kept/%s", files[i]));
         assert_int_equal(before[i].count, after.count);
         assert_memory_equal(before[i].data, after.data, after.count);
         mem_free(before[i].data);
         mem_free(after.data);
     }
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
-    assert_int_equal(rename(in_root("kept/model.gbt"), in_root("kept/aside")), 0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "by `resume`");
-    assert_int_equal(rename(in_root("kept/checkpoints/last.gbt"), in_root("kept/checkpoints/last.gbt.prev")),
-                     0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "by `overwrite`");
-    assert_int_equal(unlink(in_root("kept/checkpoints/last.gbt.prev")), 0);
-    assert_int_equal(rename(in_root("kept/aside"), in_root("kept/model.gbt")), 0);
-    train_fails(tiny, in_root("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");
+    assert_int_equal(rename(in_folder("kept/model.gbt"), in_folder("kept/aside")), 0);
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "by `resume`");
+    assert_int_equal(
+        rename(in_folder("kept/checkpoints/last.gbt"), in_folder("kept/checkpoints/last.gbt.prev")), 0);
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "by `overwrite`");
+    assert_int_equal(unlink(in_folder("kept/checkpoints/last.gbt.prev")), 0);
+    assert_int_equal(rename(in_folder("kept/aside"), in_folder("kept/model.gbt")), 0);
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");
 
-    train_ok(tiny, in_root("anew"), &def);
+    train_ok(tiny, in_folder("anew"), &def);
     gbt_error err = {0};
     def.overwrite = true;
-    train_ok(tiny, in_root("kept"), &def);
-    assert_same_file(in_root("anew/model.gbt"), in_root("kept/model.gbt"));
-    if (gbt_train_with(tiny, in_root("kept"), "iterations = 3\nseed = 6\noverwrite = 1\n", &err) != GBT_OK)
+    train_ok(tiny, in_folder("kept"), &def);
+    assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
+    if (gbt_train_with(tiny, in_folder("kept"), "iterations = 3\nseed = 6\noverwrite = 1\n", &err) != GBT_OK)
         fail_msg("%s", err.text);
-    assert_same_file(in_root("anew/model.gbt"), in_root("kept/model.gbt"));
+    assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
 }
 
 /* A run has read its photos when it starts; one that is resumed reads them again. */
 static void a_vanished_photo_is_named(void **state)
 {
     (void)state;
-    const char *data = in_root("vanishing"), *run = in_root("vanished");
+    const char *data = in_folder("vanishing"), *run = in_folder("vanished");
     make_tiny_scene(data);
     gbt_train_def def = run_def();
     def.stop_at_step = 3;
     train_fails(data, run, &def, GBT_ERR_INTERRUPTED, "after step 3");
-    bytes before = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+    file_bytes before = read_bytes(in_folder("vanished/checkpoints/last.gbt"));
 
     trainer t;
     open_ok(&t, data, &def);
-    const char *photo = in_root("vanishing/images/%s", t.scene.views[t.train_views[0]].name);
-    assert_int_equal(rename(photo, in_root("vanishing/aside.png")), 0);
+    const char *photo = in_folder("vanishing/images/%s", t.scene.views[t.train_views[0]].name);
+    assert_int_equal(rename(photo, in_folder("vanishing/aside.png")), 0);
     step_report r;
     for (int i = 0; i < VIEWS; i++)
         step_ok(&t, &r);
@@ -1105,12 +1106,12 @@ static void a_vanished_photo_is_named(void **state)
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
     train_fails(data, run, &on, GBT_ERR_FORMAT, strrchr(photo, '/') + 1);
-    bytes after = read_bytes(in_root("vanished/checkpoints/last.gbt"));
+    file_bytes after = read_bytes(in_folder("vanished/checkpoints/last.gbt"));
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.data, after.data, before.count);
     mem_free(before.data);
     mem_free(after.data);
-    assert_int_equal(rename(in_root("vanishing/aside.png"), photo), 0);
+    assert_int_equal(rename(in_folder("vanishing/aside.png"), photo), 0);
     train_ok(data, run, &on);
 }
 
@@ -1121,12 +1122,12 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.stop_at_step = 10;
-    train_fails(tiny, in_root("full"), &def, GBT_ERR_INTERRUPTED, "after step 10");
-    const char *last = in_root("full/checkpoints/last.gbt"), *copy = in_root("full_copy.gbt");
-    bytes old = read_bytes(last);
+    train_fails(tiny, in_folder("full"), &def, GBT_ERR_INTERRUPTED, "after step 10");
+    const char *last = in_folder("full/checkpoints/last.gbt"), *copy = in_folder("full_copy.gbt");
+    file_bytes old = read_bytes(last);
     assert_ok(file_write_atomic(copy, old.data, old.count, NULL));
     mem_free(old.data);
-    bytes old_model = read_bytes(in_root("full/model.gbt"));
+    file_bytes old_model = read_bytes(in_folder("full/model.gbt"));
     mem_free(old_model.data);
 
     fflush(NULL);
@@ -1138,7 +1139,7 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     def.resume = true;
     def.stop_at_step = 20;
     gbt_error err = {0};
-    const gbt_status status = gbt_train(tiny, in_root("full"), &def, &err);
+    const gbt_status status = gbt_train(tiny, in_folder("full"), &def, &err);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
     signal(SIGXFSZ, old_action);
     if (status != GBT_ERR_IO || strstr(err.text, "last.gbt") == NULL)
@@ -1146,13 +1147,13 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
 
     /* Whole, and under its own name; no half-written file beside it. */
     assert_true(file_exists(last) && is_same_file(last, copy));
-    assert_false(file_exists(in_root("full/checkpoints/.last.gbt.tmp")));
+    assert_false(file_exists(in_folder("full/checkpoints/.last.gbt.tmp")));
     model m;
-    assert_ok(model_load(in_root("full/model.gbt"), &m, NULL));
+    assert_ok(model_load(in_folder("full/model.gbt"), &m, NULL));
     assert_int_equal(m.iterations, 20);
     model_free(&m);
-    resume_ok(in_root("full"));
-    assert_same_file(straight_run(), in_root("full/model.gbt"));
+    resume_ok(in_folder("full"));
+    assert_same_file(straight_run(), in_folder("full/model.gbt"));
 }
 
 /* Makes room for what could not be written. */
@@ -1166,15 +1167,15 @@ static void a_save_that_failed_is_made_once_more(void **state)
 {
     (void)state;
     char in_its_way[PATH_SIZE];
-    snprintf(in_its_way, sizeof in_its_way, "%s", in_root("once/checkpoints/.last.gbt.tmp"));
+    snprintf(in_its_way, sizeof in_its_way, "%s", in_folder("once/checkpoints/.last.gbt.tmp"));
     assert_ok(file_make_folder(in_its_way, NULL));
     gbt_train_def def = run_def();
     def.save_every_seconds = 1e-6;
     gbt_listen(remove_at_warning, in_its_way);
-    train_ok(tiny, in_root("once"), &def);
+    train_ok(tiny, in_folder("once"), &def);
     be_quiet();
     assert_false(file_exists(in_its_way));
-    assert_same_file(straight_run(), in_root("once/model.gbt"));
+    assert_same_file(straight_run(), in_folder("once/model.gbt"));
 }
 
 static void write_file(const char *path, const unsigned char *data, size_t count)
@@ -1190,36 +1191,36 @@ static void a_damaged_checkpoint_is_refused(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("damaged"), &def, GBT_ERR_INTERRUPTED, "after step 5");
-    const char *path = in_root("damaged/checkpoints/last.gbt");
-    bytes whole = read_bytes(path);
+    train_fails(tiny, in_folder("damaged"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    const char *path = in_folder("damaged/checkpoints/last.gbt");
+    file_bytes whole = read_bytes(path);
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
     static const double cuts[] = {0, 1e-4, 0.01, 0.5, 0.999999}; /* parts of the file that are left */
     for (size_t i = 0; i < sizeof cuts / sizeof *cuts; i++) {
         write_file(path, whole.data, (size_t)(cuts[i] * (double)whole.count));
-        train_fails(tiny, in_root("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
+        train_fails(tiny, in_folder("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
     }
     for (int i = 0; i < 9; i++) {
         const size_t at = (whole.count - 1) * (size_t)i / 8;
         whole.data[at] ^= 0x10;
         write_file(path, whole.data, whole.count);
         whole.data[at] ^= 0x10;
-        train_fails(tiny, in_root("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
+        train_fails(tiny, in_folder("damaged"), &on, GBT_ERR_FORMAT, "last.gbt");
     }
     /* With an older one beside it, that one is used. */
-    write_file(in_root("damaged/checkpoints/last.gbt.prev"), whole.data, whole.count);
+    write_file(in_folder("damaged/checkpoints/last.gbt.prev"), whole.data, whole.count);
     on.stop_at_step = 6;
-    train_fails(tiny, in_root("damaged"), &on, GBT_ERR_INTERRUPTED, "after step 6");
-    bytes kept = read_bytes(in_root("damaged/checkpoints/last.gbt.prev")); /* not the damaged one */
+    train_fails(tiny, in_folder("damaged"), &on, GBT_ERR_INTERRUPTED, "after step 6");
+    file_bytes kept = read_bytes(in_folder("damaged/checkpoints/last.gbt.prev")); /* not the damaged one */
     assert_int_equal(kept.count, whole.count);
     assert_memory_equal(kept.data, whole.data, whole.count);
     mem_free(kept.data);
-    resume_ok(in_root("damaged"));
-    assert_same_file(straight_run(), in_root("damaged/model.gbt"));
+    resume_ok(in_folder("damaged"));
+    assert_same_file(straight_run(), in_folder("damaged/model.gbt"));
     mem_free(whole.data);
 
-    train_fails(tiny, in_root("empty"), &on, GBT_ERR_IO, "empty/checkpoints/last.gbt");
+    train_fails(tiny, in_folder("empty"), &on, GBT_ERR_IO, "empty/checkpoints/last.gbt");
 }
 
 /* A kill leaves rows of steps behind that the checkpoint does not know, and perhaps half a row: resuming
@@ -1229,15 +1230,15 @@ static void the_log_goes_back_with_the_checkpoint(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.stop_at_step = 5;
-    train_fails(tiny, in_root("log"), &def, GBT_ERR_INTERRUPTED, "after step 5");
-    FILE *csv = fopen(in_root("log/log.csv"), "a");
+    train_fails(tiny, in_folder("log"), &def, GBT_ERR_INTERRUPTED, "after step 5");
+    FILE *csv = fopen(in_folder("log/log.csv"), "a");
     assert_non_null(csv);
     fputs("5,0.1\n6,0.2\n700000,0.3\n700001,0.", csv);
     fclose(csv);
-    resume_ok(in_root("log"));
+    resume_ok(in_folder("log"));
     unsigned char *text = NULL;
     size_t size = 0;
-    assert_ok(file_read(in_root("log/log.csv"), &text, &size, NULL));
+    assert_ok(file_read(in_folder("log/log.csv"), &text, &size, NULL));
     assert_true(strncmp((const char *)text, "step,seconds,", 13) == 0);
     assert_non_null(strstr((const char *)text, "\n5,0.1\n"));
     assert_null(strstr((const char *)text, "\n6,0.2\n"));
@@ -1250,8 +1251,8 @@ static void a_foreign_checkpoint_is_refused(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.stop_at_step = 2;
-    train_fails(tiny, in_root("mine"), &def, GBT_ERR_INTERRUPTED, "after step 2");
-    const char *path = in_root("mine/checkpoints/last.gbt");
+    train_fails(tiny, in_folder("mine"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    const char *path = in_folder("mine/checkpoints/last.gbt");
     trainer t;
     gbt_error err = {0};
 
@@ -1268,14 +1269,14 @@ static void a_foreign_checkpoint_is_refused(void **state)
     scene_def.view_count = VIEWS - 1;
     scene_def.points = 150;
     scene_def.samples = 1;
-    assert_ok(gbt_make_scene(&scene_def, in_root("other"), &err));
+    assert_ok(gbt_make_scene(&scene_def, in_folder("other"), &err));
     gbt_train_def on = gbt_train_def_default();
     on.resume = true;
-    train_fails(in_root("other"), in_root("mine"), &on, GBT_ERR_FORMAT, "other data");
+    train_fails(in_folder("other"), in_folder("mine"), &on, GBT_ERR_FORMAT, "other data");
 
     err = (gbt_error){0}; /* a model is not a checkpoint */
     open_ok(&t, tiny, &def);
-    assert_int_equal(checkpoint_load(&t, in_root("mine/model.gbt"), &err), GBT_ERR_FORMAT);
+    assert_int_equal(checkpoint_load(&t, in_folder("mine/model.gbt"), &err), GBT_ERR_FORMAT);
     trainer_free(&t);
 }
 
@@ -1351,12 +1352,12 @@ static void pace_is_read(void **state)
     gbt_train_def def = run_def();
     def.iterations = 0;
     def.pace = "1,2";
-    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
     def.pace = "0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0";
-    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: no step in all");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: no step in all");
     def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
     def.iterations = 209;
-    train_fails(tiny, in_root("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");
     trainer t;
     def.iterations = 210;
     open_ok(&t, tiny, &def);
@@ -1806,11 +1807,11 @@ static void picked_pixels_begin_anywhere(void **state)
     scene_def.view_count = VIEWS;
     scene_def.points = 150;
     scene_def.samples = 1;
-    assert_ok(gbt_make_scene(&scene_def, in_root("square"), NULL));
+    assert_ok(gbt_make_scene(&scene_def, in_folder("square"), NULL));
     gbt_train_def def = run_def();
     def.iterations = 1000;
     def.start_level = 1;
-    open_ok(&t, in_root("square"), &def);
+    open_ok(&t, in_folder("square"), &def);
     for (; t.step < 10 * t.train_count; t.step++) {
         const step_view *v = pick_ok(&t);
         assert_true(v->outcome.level == 1 && v->outcome.parts == 1 && v->frame.draw.pixel_step == 2);
@@ -1942,7 +1943,7 @@ static void wide_photos_get_a_usual_width(void **state)
     image photo; /* of a smaller copy, whose cameras say the size of the originals */
     assert_ok(image_alloc(&photo, 20, 15, 3, NULL));
     for (int i = 0; i < 3; i++) {
-        views[i].path = (char *)in_root(i == 2 ? "small.exr" : "small.png");
+        views[i].path = (char *)in_folder(i == 2 ? "small.exr" : "small.png");
         views[i].camera.width = 100;
     }
     assert_ok(image_write(views[0].path, &photo, NULL));
@@ -2136,5 +2137,5 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_foreign_checkpoint_is_refused),
         cmocka_unit_test(every_allocation_may_fail),
     };
-    return _cmocka_run_group_tests("trainer", tests, sizeof tests / sizeof *tests, make_root, remove_root);
+    return _cmocka_run_group_tests("trainer", tests, sizeof tests / sizeof *tests, make_root, folder_remove);
 }

@@ -73,5 +73,5 @@ int main(void)
         cmocka_unit_test(gaussians_are_not_wider_than_far),
         cmocka_unit_test(the_reference_has_no_such_bound),
     };
-    return cmocka_run_group_tests(tests, make_root, remove_root);
+    return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

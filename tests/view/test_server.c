@@ -5,22 +5,22 @@
 
 #include <signal.h>
 
-#include "base/file.h"
+#include "folder.h"
 #include "base/stop_signal.h"
 #include "view/server.h"
 
 static server *s;
 static guard here;
 static int port;
-static char log_path[] = "/tmp/gbt_view_log_XXXXXX";
 
 static int start(void **state)
 {
-    (void)state;
     gbt_error err = {0};
-    const int fd = mkstemp(log_path);
-    if (fd < 0 || write(fd, "a,b\n1,2\n", 8) != 8 || close(fd) != 0 ||
-        guard_open(NULL, &here, &err) != GBT_OK || server_start(&here, 0, log_path, &s, &err) != GBT_OK)
+    if (folder_make(state) != 0)
+        return -1;
+    const char *log = in_folder("log.csv");
+    write_text(log, "a,b\n1,2\n");
+    if (guard_open(NULL, &here, &err) != GBT_OK || server_start(&here, 0, log, &s, &err) != GBT_OK)
         return -1;
     port = server_port(s);
     return 0;
@@ -28,9 +28,8 @@ static int start(void **state)
 
 static int stop(void **state)
 {
-    (void)state;
     server_stop(s);
-    return unlink(log_path);
+    return folder_remove(state);
 }
 
 /* ---- requests that are wrong ---- */

@@ -105,7 +105,7 @@ static int train_once(void **state)
     gbt_train_def def = run_def();
     if (make_root(state) != 0)
         return -1;
-    run_folder = strdup(in_root("run"));
+    run_folder = strdup(in_folder("run"));
     train_ok(tiny, run_folder, &def);
     return 0;
 }
@@ -113,7 +113,7 @@ static int train_once(void **state)
 static int clean_up(void **state)
 {
     free(run_folder);
-    return remove_root(state);
+    return folder_remove(state);
 }
 
 /* ---- pictures ---- */
@@ -143,11 +143,11 @@ static void views_are_what_render_draws(void **state)
     assert_true(json_is_true(json_object_get(first, "test")));
     assert_true(number_of(first, "width") == 48 && number_of(first, "height") == 36 &&
                 number_of(there, "anchors") > 0);
-    assert_ok(gbt_render(run_folder, in_root("drawn"), &def, NULL));
+    assert_ok(gbt_render(run_folder, in_folder("drawn"), &def, NULL));
     snprintf(file, sizeof file, "drawn/%s", json_string_value(json_object_get(first, "name")));
     for (int i = 0; i < 2; i++) { /* drawn, and kept from before */
         reply r = get_ok(port, "/render?view=0");
-        assert_same_pixels(&r, in_root("%s", file));
+        assert_same_pixels(&r, in_folder("%s", file));
         free(r.text);
     }
     snprintf(path, sizeof path, "%s/images/%s", tiny, json_string_value(json_object_get(first, "name")));
@@ -174,12 +174,12 @@ static void cameras_are_what_render_draws(void **state)
             "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,\"height\":20,%s}",
             lenses[i]);
         gbt_render_def def = gbt_render_def_default();
-        def.camera = in_root("lens.json");
+        def.camera = in_folder("lens.json");
         assert_ok(file_write_atomic(def.camera, text, (size_t)length, NULL));
-        assert_ok(gbt_render(run_folder, in_root("drawn"), &def, NULL));
+        assert_ok(gbt_render(run_folder, in_folder("drawn"), &def, NULL));
         snprintf(path, sizeof path, "/render?camera=%s", text);
         reply r = get_ok(port, path);
-        assert_same_pixels(&r, in_root("drawn/lens.png"));
+        assert_same_pixels(&r, in_folder("drawn/lens.png"));
         free(r.text);
     }
     close_viewer(&v, SIGTERM);
@@ -244,9 +244,9 @@ static void a_picture_that_nobody_waits_for_is_given_up(void **state)
         studio_answer(&s, &what, &whole);
         assert_int_equal(whole.code, 200);
         def.renderer = renderers[i];
-        assert_ok(gbt_render(run_folder, in_root("whole"), &def, &assert_ok_err_));
+        assert_ok(gbt_render(run_folder, in_folder("whole"), &def, &assert_ok_err_));
         const reply r = {.body = (char *)whole.bytes, .body_count = whole.count};
-        assert_same_pixels(&r, in_root("whole/0000.png"));
+        assert_same_pixels(&r, in_folder("whole/0000.png"));
         mem_free(none.bytes);
         mem_free(whole.bytes);
     }
@@ -418,14 +418,14 @@ static void masked_and_large_photos(void **state)
     assert_ok(image_alloc(&mask, 48, 36, 1, NULL));
     for (int i = 0; i < 48 * 36; i++)
         mask.pixels[i] = i % 48 >= 16;
-    assert_ok(file_make_folder(in_root("beside"), NULL));
-    assert_ok(image_write(in_root("beside/mask.png"), &mask, NULL));
+    assert_ok(file_make_folder(in_folder("beside"), NULL));
+    assert_ok(image_write(in_folder("beside/mask.png"), &mask, NULL));
     image_free(&mask);
     for (int i = 0; i < 2; i++)
-        copy_file(in_root("tiny/images/0000.png"), in_root("beside/%d.png", i));
-    assert_ok(file_write_atomic(in_root("beside/transforms.json"), text, sizeof text - 1, NULL));
+        copy_file(in_folder("tiny/images/0000.png"), in_folder("beside/%d.png", i));
+    assert_ok(file_write_atomic(in_folder("beside/transforms.json"), text, sizeof text - 1, NULL));
     viewer v;
-    const int port = open_viewer_beside(&v, run_folder, in_root("beside"));
+    const int port = open_viewer_beside(&v, run_folder, in_folder("beside"));
     reply r = get_ok(port, "/photo?view=0");
     assert_int_equal(r.body_count, 4 * 48 * 36);
     for (int i = 0; i < 48 * 36; i++)
@@ -462,18 +462,17 @@ static void wait_for_version(int port, int version)
 static void newer_models_are_shown(void **state)
 {
     (void)state;
-    char saved[PATH_SIZE + 16], *live = strdup(in_root("live"));
+    char saved[PATH_SIZE + 16], *live = strdup(in_folder("live"));
     gbt_train_def def = run_def();
     viewer v;
     snprintf(saved, sizeof saved, "%s/model.gbt", live);
-    assert_ok(file_make_folder(live, NULL));
-    copy_file(in_root("run/config"), in_root("live/config"));
+    copy_file(in_folder("run/config"), in_folder("live/config"));
     const int port = open_viewer(&v, live);
     reply none = http_get(port, "/scene");
     assert_int_equal(none.code, 503);
     assert_non_null(strstr(none.body, "has not saved a model yet"));
     free(none.text);
-    copy_file(in_root("run/model.gbt"), saved);
+    copy_file(in_folder("run/model.gbt"), saved);
     wait_for_version(port, 1);
     reply before = get_ok(port, "/render?view=0");
     assert_ok(file_write_atomic(saved, "damaged", 7, NULL)); /* said, and the old one stays */
@@ -489,8 +488,8 @@ static void newer_models_are_shown(void **state)
     reply same = get_ok(port, "/render?view=0");
     assert_true(mean_difference(&before, &same) == 0);
     def.iterations = 20;
-    train_ok(tiny, in_root("other"), &def);
-    copy_file(in_root("other/model.gbt"), saved);
+    train_ok(tiny, in_folder("other"), &def);
+    copy_file(in_folder("other/model.gbt"), saved);
     wait_for_version(port, 2);
     reply after = get_ok(port, "/render?view=0");
     assert_true(mean_difference(&before, &after) > 0.5);
@@ -509,12 +508,12 @@ static void newer_models_are_shown(void **state)
 static void a_result_folder_is_shown(void **state)
 {
     (void)state;
-    const char *folder = in_root("result/");
+    const char *folder = in_folder("result/");
     gbt_export_def baked = gbt_export_def_default();
     baked.refine_steps = 0;
     assert_ok(gbt_export(run_folder, &baked, &folder, 1, NULL, NULL));
     viewer v;
-    const int port = open_viewer(&v, in_root("result"));
+    const int port = open_viewer(&v, in_folder("result"));
     json_t *there = get_json(port, "/scene");
     assert_true(json_is_true(json_object_get(there, "plain")) && number_of(there, "gaussians") > 0);
     assert_true(json_array_size(json_object_get(there, "views")) > 0);
@@ -528,7 +527,7 @@ static void plain_gaussians_are_shown(void **state)
     (void)state;
     static const char camera[] = "{\"origin\":[0.5,-2,1],\"target\":[0,0,0.2],\"up\":[0,0,1],\"width\":40,"
                                  "\"height\":30,\"fov_x_deg\":60}";
-    const char *ply = in_root("plain.ply");
+    const char *ply = in_folder("plain.ply");
     gbt_export_def baked = gbt_export_def_default();
     baked.refine_steps = 0;
     assert_ok(gbt_export(run_folder, &baked, &ply, 1, NULL, NULL));
@@ -540,13 +539,13 @@ static void plain_gaussians_are_shown(void **state)
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);
     assert_string_equal(json_string_value(json_object_get(status, "note")), "");
     gbt_render_def def = gbt_render_def_default();
-    def.camera = in_root("plain.json");
+    def.camera = in_folder("plain.json");
     assert_ok(file_write_atomic(def.camera, camera, sizeof camera - 1, NULL));
-    assert_ok(gbt_render(ply, in_root("drawn"), &def, NULL));
+    assert_ok(gbt_render(ply, in_folder("drawn"), &def, NULL));
     char path[256];
     snprintf(path, sizeof path, "/render?camera=%s", camera);
     reply r = get_ok(port, path);
-    assert_same_pixels(&r, in_root("drawn/plain.png"));
+    assert_same_pixels(&r, in_folder("drawn/plain.png"));
     free(r.text);
     snprintf(path, sizeof path, "/render?format=float&output=anchor&camera=%s", camera);
     r = get_ok(port, path);
@@ -562,7 +561,7 @@ static void the_extent_of_many_gaussians(void **state)
 {
     (void)state;
     enum { COUNT = 100002 };
-    const char *ply = in_root("many.ply");
+    const char *ply = in_folder("many.ply");
     gaussian_cloud c;
     assert_ok(gaussian_cloud_alloc(&c, COUNT, NULL));
     c.count = 0;
@@ -605,8 +604,8 @@ static void what_cannot_be_shown(void **state)
         gbt_error err = {0};
         def.port = rows[i].port;
         def.host = rows[i].host;
-        def.data = rows[i].data != NULL ? in_root("%s", rows[i].data) : NULL;
-        const gbt_status status = gbt_view(in_root("%s", rows[i].input), &def, &err);
+        def.data = rows[i].data != NULL ? in_folder("%s", rows[i].data) : NULL;
+        const gbt_status status = gbt_view(in_folder("%s", rows[i].input), &def, &err);
         if (status != rows[i].status || strstr(err.text, rows[i].says) == NULL)
             fail_msg("%s: wanted %d with \"%s\", got %d: %s", rows[i].input, (int)rows[i].status,
                      rows[i].says, (int)status, err.text);
@@ -621,7 +620,7 @@ static void a_model_without_its_photos(void **state)
     viewer v;
     snprintf(away, sizeof away, "%s.away", tiny);
     assert_int_equal(rename(tiny, away), 0);
-    const int port = open_viewer(&v, in_root("run/model.gbt"));
+    const int port = open_viewer(&v, in_folder("run/model.gbt"));
     assert_int_equal(rename(away, tiny), 0);
     json_t *there = get_json(port, "/scene"), *status = get_json(port, "/status");
     assert_int_equal(json_array_size(json_object_get(there, "views")), 0);

@@ -21,7 +21,7 @@
 #include "data/json_out.h"
 #include "image/metrics.h"
 #include "run/loaded_run.h"
-#include "train/near.h"
+#include "train/near_distance.h"
 
 enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
 
@@ -174,7 +174,7 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
 static trace_settings viewer_at(const exporting *e, size_t index, float near)
 {
     trace_settings s = e->viewer;
-    s.t_near = view_near(near, &e->run.def, &e->run.scene.views[e->views[index]]);
+    s.t_near = near_of_view(near, &e->run.def, &e->run.scene.views[e->views[index]]);
     return s;
 }
 

@@ -6,7 +6,7 @@
 
 #include "train/def.h"
 #include "train/photos.h"
-#include "train/step_size.h"
+#include "train/step_pixels.h"
 
 /* Core-seconds of a step, for the anchors in view and by its pixels, with AVX2. Chosen on runs of 42, 84 and
    120 s of plush, fox, castle, aerial and the demo on two cores of a server CPU (bench/figures.py), which
@@ -25,7 +25,7 @@ static double core_seconds_of_step(const gbt_camera *camera, const train_rules *
     double steps_per_second = 0;
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double progress = (part + 0.5) / PACE_SEGMENTS,
-                     megapixels = step_size_of(camera, rules, progress).pixels / 1e6,
+                     megapixels = step_pixels_of(camera, rules, progress).pixels / 1e6,
                      hits = step_hits_per_pixel(rules, progress);
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;

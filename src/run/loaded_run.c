@@ -18,7 +18,7 @@
 #include "data/gaussian_ply.h"
 #include "data/result_folder.h"
 #include "train/camera_sees.h"
-#include "train/near.h"
+#include "train/near_distance.h"
 #include "train/pose_file.h"
 #include "train/rules.h"
 #include "train/run_split.h"
@@ -286,7 +286,7 @@ frame_subject loaded_run_subject(const loaded_run *r)
 trace_settings loaded_run_settings(const loaded_run *r, size_t view)
 {
     trace_settings settings = r->settings;
-    settings.t_near = view_near(settings.t_near, &r->def, &r->scene.views[view]);
+    settings.t_near = near_of_view(settings.t_near, &r->def, &r->scene.views[view]);
     return settings;
 }
 

@@ -4,7 +4,7 @@
 
 #include <math.h>
 
-#include "train/step_size.h"
+#include "train/step_pixels.h"
 
 /* What the time of pixels grows with: of a finer picture a pixel costs less, for those beside it see the same
    Gaussians. Four times as many took 1.2 to 2.7 times as long, in the middle 2. */
@@ -39,7 +39,7 @@ static double expected_step(const trainer *t, const step_speed *s, int part)
             const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
             sum += s->fixed_seconds +
                    s->load_seconds *
-                       pixel_load(&t->rules, step_size_of(&camera, &t->rules, progress).pixels, progress);
+                       pixel_load(&t->rules, step_pixels_of(&camera, &t->rules, progress).pixels, progress);
         }
     }
     return sum / (double)(PLACES * t->train_count);

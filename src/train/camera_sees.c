@@ -6,7 +6,7 @@
 
 #include "base/vec.h"
 
-bool camera_pixel(const gbt_camera *camera, const float position[3], double pixel[2])
+bool camera_sees_at(const gbt_camera *camera, const float position[3], double pixel[2])
 {
     const double point[3] = {(double)position[0], (double)position[1], (double)position[2]};
     return gbt_camera_pixel(camera, point, pixel) && pixel[0] >= 0 && pixel[1] >= 0 &&
@@ -20,5 +20,5 @@ bool camera_sees(const gbt_camera *camera, const float position[3], double *dist
         d[k] = (double)position[k] - camera->center[k];
     if (distance != NULL)
         *distance = dvec_length(d);
-    return camera_pixel(camera, position, pixel);
+    return camera_sees_at(camera, position, pixel);
 }

@@ -8,7 +8,7 @@
 #include "gbtrace/camera.h"
 
 /** Where in the picture a point is, pixels; false where it is not in it. */
-bool camera_pixel(const gbt_camera *camera, const float position[3], double pixel[2]);
+bool camera_sees_at(const gbt_camera *camera, const float position[3], double pixel[2]);
 
 /** @param distance [out] optional (NULL): from the camera centre, also of a point beside the picture. Cost:
                       one projection. */

@@ -14,7 +14,7 @@
 #include "io/container.h"
 #include "io/row_sections.h"
 #include "train/config.h"
-#include "train/widest.h"
+#include "train/scale_limit.h"
 
 enum { PHOTO_END_BYTES = 2048 };
 
@@ -337,7 +337,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     t->pace.known = (int)counters[4];
     t->anchors_initial = counters[7];
     GBT_TRY(read_creation(t, c, path, err));
-    return widest_update(t, err);
+    return scale_limit_update(t, err);
 }
 
 gbt_status checkpoint_load(trainer *t, const char *path, gbt_error *err)

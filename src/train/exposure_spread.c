@@ -27,7 +27,7 @@ static bool compare_at(const photos *p, size_t view, const gbt_camera *camera, s
     const scene_points *points = &p->source->points;
     const float *known = points->color + 3 * point;
     double pixel[2];
-    if (!is_exposed(known) || !camera_pixel(camera, points->position + 3 * point, pixel))
+    if (!is_exposed(known) || !camera_sees_at(camera, points->position + 3 * point, pixel))
         return false;
     const size_t at = (size_t)pixel[1] * (size_t)camera->width + (size_t)pixel[0];
     if (p->full_valid[view] != NULL && !p->full_valid[view][at])

@@ -11,10 +11,10 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "bvh/points.h"
-#include "train/def.h"
 #include "train/camera_sees.h"
-#include "train/near.h"
-#include "train/widest.h"
+#include "train/def.h"
+#include "train/near_distance.h"
+#include "train/scale_limit.h"
 
 static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
 static const double last_rounds_from = 0.9; /* of growing */
@@ -123,7 +123,7 @@ static bool two_views_see(const void *context, const float position[3])
         double distance;
         const scene_view *view = &t->scene.views[t->train_views[v]];
         seen += camera_sees(&view->camera, position, &distance) &&
-                distance > (double)view_near(t->settings.t_near, &t->def, view);
+                distance > (double)near_of_view(t->settings.t_near, &t->def, view);
     }
     return seen == VIEWS_MIN;
 }
@@ -202,7 +202,7 @@ gbt_status growing_round(trainer *t, gbt_error *err)
     if (status == GBT_OK)
         status = follow_all(t, &result, err);
     if (status == GBT_OK)
-        status = widest_update(t, err);
+        status = scale_limit_update(t, err);
     mem_free(known.nearest);
     mem_free(known.scale);
     mem_free(result.source);

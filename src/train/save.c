@@ -11,8 +11,8 @@
 #include "io/model_file.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/finest_pixel.h"
 #include "train/pose_file.h"
-#include "train/sampling.h"
 
 /* The smallest pixel of each anchor, from the training views; NULL without a footprint. */
 static gbt_status find_anchor_pixels(const trainer *t, float **out, gbt_error *err)
@@ -26,7 +26,7 @@ static gbt_status find_anchor_pixels(const trainer *t, float **out, gbt_error *e
     if (fine) {
         for (size_t i = 0; i < t->train_count; i++)
             cameras[i] = photos_camera(&t->photos, t->train_views[i], 0);
-        sampling_find(&t->anchors, cameras, t->train_count, *out);
+        finest_pixel_find(&t->anchors, cameras, t->train_count, *out);
     }
     mem_free(cameras);
     return fine ? GBT_OK : GBT_ERR_NO_MEMORY;

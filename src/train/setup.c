@@ -14,10 +14,10 @@
 #include "train/camera_sees.h"
 #include "train/config.h"
 #include "train/def.h"
-#include "train/near.h"
+#include "train/near_distance.h"
+#include "train/scale_limit.h"
 #include "train/setup_data.h"
 #include "train/trainer.h"
-#include "train/widest.h"
 
 enum { STREAM_NETWORKS = 2, DISTANCE_VIEWS = 4096 };
 
@@ -137,7 +137,7 @@ static gbt_status make_state(trainer *t, gbt_error *err)
         GBT_TRY(exposures_make(&t->exposures, t->train_count, err));
     if (t->def.refine_poses)
         GBT_TRY(poses_make(&t->poses, &t->scene, t->train_count, t->distance, err));
-    GBT_TRY(widest_update(t, err));
+    GBT_TRY(scale_limit_update(t, err));
     return growth_stats_resize(&t->stats, t->anchors.count, t->def.offsets, err);
 }
 
@@ -176,7 +176,8 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     t->decoder.distance_max = p95 * t->decoder.distance_scale;
     t->settings = trace_settings_default();
     if (t->rules.near_depth == 0) {
-        GBT_TRY(scene_near(&t->scene, t->train_views, t->train_count, def->near, &t->settings.t_near, err));
+        GBT_TRY(
+            near_of_scene(&t->scene, t->train_views, t->train_count, def->near, &t->settings.t_near, err));
         t->settings.t_near = fmaxf(t->settings.t_near, 0.02f * median);
     } else {
         t->settings.t_near = t->rules.near_depth;

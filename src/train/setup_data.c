@@ -15,7 +15,7 @@
 #include "train/memory_need.h"
 #include "train/seed_points.h"
 #include "train/seen_points.h"
-#include "train/step_size.h"
+#include "train/step_pixels.h"
 
 /* ---- points ---- */
 
@@ -194,7 +194,7 @@ double setup_photo_steps(const trainer *t)
     double sum = 0;
     for (size_t i = 0; i < t->train_count; i++) {
         const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
-        const int parts = step_size_of(&c, &t->rules, 1).parts;
+        const int parts = step_pixels_of(&c, &t->rules, 1).parts;
         sum += (double)parts * parts;
     }
     return sum;

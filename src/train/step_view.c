@@ -14,9 +14,9 @@
 #include "train/gradient_check.h"
 #include "train/growing.h"
 #include "train/loss.h"
-#include "train/near.h"
+#include "train/near_distance.h"
+#include "train/step_pixels.h"
 #include "train/step_rows.h"
-#include "train/step_size.h"
 #include "train/trainer.h"
 
 enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, STREAM_PARTS = 6, STREAM_BACKGROUND = 8, STREAM_LEFT_OUT = 10 };
@@ -52,10 +52,10 @@ static size_t pick_photo(trainer *t, uint64_t before)
 }
 
 /* Of a photo, at the progress of this step. */
-static step_size size_of_step(const trainer *t, size_t view)
+static step_pixels size_of_step(const trainer *t, size_t view)
 {
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
-    return step_size_of(&camera, &t->rules, pace_progress(&t->pace, t->step));
+    return step_pixels_of(&camera, &t->rules, pace_progress(&t->pace, t->step));
 }
 
 /* The first of every 2^level-th pixel: at most four places along a side, so that what is known of the lens at
@@ -68,7 +68,7 @@ static int random_phase(uint32_t word, int level)
 
 /* Which pixels of the photo: random ones of every 2^level-th; or a part, another one whenever the photo comes
    up, so that all have their turn. */
-static photo_sample pick_pixels(const trainer *t, step_size size, size_t slot, uint64_t before)
+static photo_sample pick_pixels(const trainer *t, step_pixels size, size_t slot, uint64_t before)
 {
     uint32_t words[4];
     rng_philox(t->def.seed, STREAM_PIXELS, before, words);
@@ -113,7 +113,7 @@ void step_photos_pick(trainer *t)
 static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err)
 {
     const size_t view = t->train_views[v->slot];
-    const step_size size = size_of_step(t, view);
+    const step_pixels size = size_of_step(t, view);
     v->frame.draw.chance = (visible_chance){
         .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)STREAM_LEFT_OUT << 48 | before};
     v->outcome.level = size.level;
@@ -170,14 +170,14 @@ static gbt_renderer renderer_of_step(const trainer *t, const gbt_camera *camera,
 
 float step_view_near(const trainer *t, const step_view *v)
 {
-    return view_near(t->settings.t_near, &t->def, &t->scene.views[t->train_views[v->slot]]);
+    return near_of_view(t->settings.t_near, &t->def, &t->scene.views[t->train_views[v->slot]]);
 }
 
 gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt_camera *camera, bool adjoint,
                           gbt_error *err)
 {
     trace_settings settings = t->settings;
-    settings.t_near = view_near(t->settings.t_near, &t->def, &t->scene.views[view]);
+    settings.t_near = near_of_view(t->settings.t_near, &t->def, &t->scene.views[view]);
     v->frame.draw.pixel_step = 1;
     v->frame.draw.renderer = t->def.renderer;
     v->frame.draw.one_start = false;

@@ -57,7 +57,7 @@ struct trainer {
     double extent, first_scale_max;       /* an isolated point would start as a floater */
     float scale_log_min, scale_log_limit; /* every log-scale is kept in here: far outside what a scene needs,
                                              far inside what floats hold */
-    float *scale_log_max;                 /* [anchors.count]: and below this (train/widest.h) */
+    float *scale_log_max;                 /* [anchors.count]: and below this (train/scale_limit.h) */
     trace_settings settings;
     sky_moments sky; /* of the background in `settings`, where it varies */
     size_t anchors_initial, points_used;

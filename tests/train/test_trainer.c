@@ -30,7 +30,7 @@
 #include "train/save.h"
 #include "train/seed_points.h"
 #include "train/setup_data.h"
-#include "train/step_size.h"
+#include "train/step_pixels.h"
 
 /* The run that others are compared with: STEPS steps in one go. */
 static const char *straight_run(void)
@@ -430,7 +430,7 @@ static void a_budget_gives_its_parts_equal_times(void **state)
         budget_extend(&t, &speed);
         for (uint64_t i = 0; i < t.pace.steps[part]; i++, t.step++) {
             const double progress = pace_progress(&t.pace, t.step);
-            const step_size size = step_size_of(&camera, &t.rules, progress);
+            const step_pixels size = step_pixels_of(&camera, &t.rules, progress);
             const double pixels = size.pixels, times = t.step % 50 == 49 ? 20 : 1,
                          of_pixels = times * ldexp(1e-6, size.level) * pixels *
                                      (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
@@ -1897,7 +1897,7 @@ static void steps_keep_to_their_pixels(void **state)
         for (double progress = 0; progress < 1; progress += 0.05) {
             view->camera.width = width;
             view->camera.height = width * 2 / 3;
-            const step_size size = step_size_of(&view->camera, &t.rules, progress);
+            const step_pixels size = step_pixels_of(&view->camera, &t.rules, progress);
             const double pixels = size.pixels, all = (double)width * view->camera.height,
                          budget = t.rules.step_pixels;
             assert_true(pixels <= 2.3 * budget);
@@ -1910,7 +1910,7 @@ static void steps_keep_to_their_pixels(void **state)
         }
     view->camera = (gbt_camera){
         .model = GBT_CAMERA_EQUIRECTANGULAR, .width = 4000, .height = 2000, .params = {4000, 2000}};
-    assert_int_equal(step_size_of(&view->camera, &t.rules, 0.95).parts, 1); /* has no parts */
+    assert_int_equal(step_pixels_of(&view->camera, &t.rules, 0.95).parts, 1); /* has no parts */
     trainer_free(&t);
 }
 

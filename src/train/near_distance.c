@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/near.c -- near distances by the sparse points that photos show. */
-#include "train/near.h"
+/* train/near_distance.c -- near distances by the sparse points that photos show. */
+#include "train/near_distance.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,14 +11,14 @@
 
 enum { NEARER_VIEWS = 20 /* one in so many may be nearer to things */ };
 
-float view_near(float t_near, const gbt_train_def *def, const scene_view *view)
+float near_of_view(float t_near, const gbt_train_def *def, const scene_view *view)
 {
     const double share = train_rules_of(def).near_depth == 0 ? def->near : 0;
     return share > 0 && view->nearest > 0 ? fminf(t_near, (float)(share * view->nearest)) : t_near;
 }
 
-gbt_status scene_near(const scene *s, const size_t *views, size_t count, double share, float *out,
-                      gbt_error *err)
+gbt_status near_of_scene(const scene *s, const size_t *views, size_t count, double share, float *out,
+                         gbt_error *err)
 {
     double *nearest = mem_alloc(count, sizeof *nearest, "nearest points", err);
     if (nearest == NULL)

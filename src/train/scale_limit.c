@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/widest.c -- the distance from each anchor to the nearest training camera, as a bound of its scales.
- */
-#include "train/widest.h"
+/* train/scale_limit.c -- scales are bound by the distance to the nearest training camera. */
+#include "train/scale_limit.h"
 
 #include <math.h>
 
@@ -33,7 +32,7 @@ static gbt_status find_distances(const trainer *t, double *squared, gbt_error *e
     return status;
 }
 
-gbt_status widest_update(trainer *t, gbt_error *err)
+gbt_status scale_limit_update(trainer *t, gbt_error *err)
 {
     const size_t count = t->anchors.count;
     float *log_max = mem_alloc(count, sizeof *log_max, "largest scales", err);

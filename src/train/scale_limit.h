@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/widest.h -- how wide the Gaussians of each anchor may become. */
-#ifndef GBT_TRAIN_WIDEST_H
-#define GBT_TRAIN_WIDEST_H
+/* train/scale_limit.h -- how wide the Gaussians of each anchor may become. */
+#ifndef GBT_TRAIN_SCALE_LIMIT_H
+#define GBT_TRAIN_SCALE_LIMIT_H
 
 #include "train/trainer.h"
 
@@ -15,6 +15,6 @@
  * @return GBT_OK, GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL (Embree); cost: a search in the tree of cameras for
  * each anchor
  */
-gbt_status widest_update(trainer *t, gbt_error *err);
+gbt_status scale_limit_update(trainer *t, gbt_error *err);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sampling.c -- smallest pixel per anchor. */
-#include "train/sampling.h"
+/* train/finest_pixel.c -- smallest pixel per anchor. */
+#include "train/finest_pixel.h"
 
 #include <math.h>
 
@@ -10,17 +10,17 @@
 
 enum { ANCHOR_BLOCK = 1024 };
 
-typedef struct sampling_job {
+typedef struct finest_pixel_job {
     const anchors *a;
     const gbt_camera *cameras;
     size_t camera_count;
     float *out;
-} sampling_job;
+} finest_pixel_job;
 
-static void sampling_block(size_t block, size_t begin, size_t end, void *context)
+static void finest_pixel_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
-    const sampling_job *job = context;
+    const finest_pixel_job *job = context;
     for (size_t i = begin; i < end; i++)
         job->out[i] = INFINITY;
     for (size_t c = 0; c < job->camera_count; c++) {
@@ -43,8 +43,8 @@ static void sampling_block(size_t block, size_t begin, size_t end, void *context
         job->out[i] = isfinite(job->out[i]) ? job->out[i] : 0;
 }
 
-void sampling_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out)
+void finest_pixel_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out)
 {
-    sampling_job job = {a, cameras, camera_count, out};
-    parallel_blocks(a->count, ANCHOR_BLOCK, sampling_block, &job);
+    finest_pixel_job job = {a, cameras, camera_count, out};
+    parallel_blocks(a->count, ANCHOR_BLOCK, finest_pixel_block, &job);
 }

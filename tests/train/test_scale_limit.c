@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_widest.c -- no Gaussian becomes wider than its anchor's distance to the cameras lets it.
- */
+/* tests/train/test_scale_limit.c -- no Gaussian becomes wider than the distance to the cameras lets it. */
 #include "run_support.h"
 
 /* By the definition, camera after camera. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sampling.h -- how finely the training views sampled each anchor. */
-#ifndef GBT_TRAIN_SAMPLING_H
-#define GBT_TRAIN_SAMPLING_H
+/* train/finest_pixel.h -- how finely the training views sampled each anchor. */
+#ifndef GBT_TRAIN_FINEST_PIXEL_H
+#define GBT_TRAIN_FINEST_PIXEL_H
 
 #include "anchor/anchors.h"
 #include "gbtrace/camera.h"
@@ -14,6 +14,6 @@
  * @param out     [out] [a->count] scene-local units (trace/footprint.h); 0 for anchors that no camera sees
  * Threads: uses all; same bits for every thread count. Cost: less than 100 ns per anchor and camera.
  */
-void sampling_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out);
+void finest_pixel_find(const anchors *a, const gbt_camera *cameras, size_t camera_count, float *out);
 
 #endif

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* tests/train/test_near.c -- how near to a camera things are drawn. */
+/* tests/train/test_near_distance.c -- how near to a camera things are drawn. */
 #include "run_support.h"
 
-#include "train/near.h"
+#include "train/near_distance.h"
 
 /* One close-up among many photos has its own near distance, and the others keep theirs. */
 static void a_close_up_is_alone(void **state)
@@ -22,15 +22,15 @@ static void a_close_up_is_alone(void **state)
     def.near = 0.5;
     reference.compat = true;
     float near;
-    assert_ok(scene_near(&s, all, COUNT, 0.5, &near, NULL));
+    assert_ok(near_of_scene(&s, all, COUNT, 0.5, &near, NULL));
     assert_true(near >= 2 && near < 2.1f);
-    assert_true(view_near(near, &def, &views[17]) == 0.1f && view_near(near, &def, &views[3]) == near);
+    assert_true(near_of_view(near, &def, &views[17]) == 0.1f && near_of_view(near, &def, &views[3]) == near);
     for (size_t i = 5; i < COUNT; i++)
-        assert_true(i == 17 || view_near(near, &def, &views[i]) > 1.9f);
-    assert_true(view_near(0.3f, &reference, &views[17]) == 0.3f); /* nothing is asked of the points */
-    assert_ok(scene_near(&s, all, 10, 0.5, &near, NULL));         /* of few photos, the least */
+        assert_true(i == 17 || near_of_view(near, &def, &views[i]) > 1.9f);
+    assert_true(near_of_view(0.3f, &reference, &views[17]) == 0.3f); /* nothing is asked of the points */
+    assert_ok(near_of_scene(&s, all, 10, 0.5, &near, NULL));         /* of few photos, the least */
     assert_true(near == 2);
-    assert_ok(scene_near(&s, all + 3, 1, 0.5, &near, NULL));
+    assert_ok(near_of_scene(&s, all + 3, 1, 0.5, &near, NULL));
     assert_true(near == 0);
 }
 

@@ -31,7 +31,7 @@ typedef struct parameter_class {
     size_t count;
 } parameter_class;
 
-enum { CLASS_COUNT = ANCHOR_FIELDS - ANCHOR_FIRST_LEARNED + DECODER_PARTS };
+enum { CLASS_COUNT = ANCHOR_FIELDS - ANCHOR_FIRST_LEARNED + DECODER_NETWORKS };
 
 static void list_classes(grad_checker *c, parameter_class out[CLASS_COUNT])
 {
@@ -44,15 +44,15 @@ static void list_classes(grad_checker *c, parameter_class out[CLASS_COUNT])
         snprintf(out->name, sizeof out->name, "%s", anchor_fields[f].label);
         out++;
     }
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(&c->run->model.decoder, parts);
-    for (int i = 0; i < DECODER_PARTS; i++) {
-        const size_t b = parts[i].begin;
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(&c->run->model.decoder, networks);
+    for (int i = 0; i < DECODER_NETWORKS; i++) {
+        const size_t b = networks[i].begin;
         *out = (parameter_class){.value = c->parameters.params + b,
                                  .wanted = c->d_parameters.params + b,
                                  .got = c->d_params + b,
-                                 .count = parts[i].end - b};
-        snprintf(out->name, sizeof out->name, "%s mlp", parts[i].label);
+                                 .count = networks[i].end - b};
+        snprintf(out->name, sizeof out->name, "%s mlp", networks[i].label);
         out++;
     }
 }

@@ -28,9 +28,9 @@ static size_t input_count(const decode_ref *r) { return FEATURE + 3 + (r->has_di
 
 static size_t out_count(const decode_ref *r, int head)
 {
-    static const size_t per_offset[DECODER_PARTS] = {
+    static const size_t per_offset[DECODER_NETWORKS] = {
 #define X(id, label, outputs) outputs,
-        DECODER_PART_LIST(X)
+        DECODER_NETWORK_LIST(X)
 #undef X
     };
     return per_offset[head] * (size_t)r->offset_count;

@@ -51,15 +51,15 @@ void anchors_zero_learned(anchors *a)
 static const struct {
     const char *label;
     size_t outputs; /* for each Gaussian */
-} networks[DECODER_PARTS] = {
+} network_list[DECODER_NETWORKS] = {
 #define X(id, label, outputs) {label, outputs},
-    DECODER_PART_LIST(X)
+    DECODER_NETWORK_LIST(X)
 #undef X
 };
 
-static size_t part_size(int part, size_t offset_count, size_t input_count)
+static size_t network_size(int network, size_t offset_count, size_t input_count)
 {
-    const size_t out = offset_count * networks[part].outputs;
+    const size_t out = offset_count * network_list[network].outputs;
     return ANCHOR_HIDDEN_DIM * (input_count + 1) + out * (ANCHOR_HIDDEN_DIM + 1);
 }
 
@@ -73,8 +73,8 @@ gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_
                          ANCHOR_MAX_OFFSETS);
     const size_t in = input_dim(has_distance);
     size_t param_count = 0;
-    for (int part = 0; part < DECODER_PARTS; part++)
-        param_count += part_size(part, (size_t)offset_count, in);
+    for (int i = 0; i < DECODER_NETWORKS; i++)
+        param_count += network_size(i, (size_t)offset_count, in);
     float *params = mem_alloc(param_count, sizeof *params, "decoder", err);
     if (params == NULL)
         return GBT_ERR_NO_MEMORY;
@@ -85,14 +85,14 @@ gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_
                    .distance_max = INFINITY,
                    .param_count = param_count,
                    .params = params};
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(d, parts);
-    for (int part = 0; part < DECODER_PARTS; part++) {
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(d, networks);
+    for (int i = 0; i < DECODER_NETWORKS; i++) {
         const size_t first_layer = ANCHOR_HIDDEN_DIM * (in + 1);
-        for (size_t i = 0; i < parts[part].end - parts[part].begin; i++) {
-            const double bound = 1.0 / sqrt(i < first_layer ? (double)in : (double)ANCHOR_HIDDEN_DIM);
-            const double u = (double)rng_uniform(seed, (uint64_t)part, i);
-            params[parts[part].begin + i] = (float)((2.0 * u - 1.0) * bound);
+        for (size_t p = 0; p < networks[i].end - networks[i].begin; p++) {
+            const double bound = 1.0 / sqrt(p < first_layer ? (double)in : (double)ANCHOR_HIDDEN_DIM);
+            const double u = (double)rng_uniform(seed, (uint64_t)i, p);
+            params[networks[i].begin + p] = (float)((2.0 * u - 1.0) * bound);
         }
     }
     return GBT_OK;
@@ -104,12 +104,12 @@ void decoder_free(decoder *d)
     memset(d, 0, sizeof *d);
 }
 
-void decoder_parts(const decoder *d, decoder_part parts[DECODER_PARTS])
+void decoder_networks(const decoder *d, decoder_network networks[DECODER_NETWORKS])
 {
     size_t begin = 0;
-    for (int part = 0; part < DECODER_PARTS; part++) {
-        const size_t size = part_size(part, (size_t)d->offset_count, input_dim(d->has_distance));
-        parts[part] = (decoder_part){networks[part].label, networks[part].outputs, begin, begin + size};
+    for (int i = 0; i < DECODER_NETWORKS; i++) {
+        const size_t size = network_size(i, (size_t)d->offset_count, input_dim(d->has_distance));
+        networks[i] = (decoder_network){network_list[i].label, network_list[i].outputs, begin, begin + size};
         begin += size;
     }
 }

@@ -70,7 +70,7 @@ void anchors_zero_learned(anchors *a);
 /* ---- networks ---- */
 
 /** Inputs: feature(32), unit direction camera -> anchor (3), distance if has_distance (1). Hidden 32, ReLU.
-    Heads: opacity K tanh, shape 7K, colour 3K sigmoid. */
+    Networks: opacity K tanh, shape 7K, colour 3K sigmoid. */
 typedef struct decoder {
     int offset_count;
     bool has_distance;
@@ -89,24 +89,31 @@ void decoder_free(decoder *d);
 
 /** The networks, listed once, in the order of their parameters: X(id, label, outputs per Gaussian). They have
     learning rates of their own (train/learnables.c). */
-#define DECODER_PART_LIST(X)                                                                                 \
+#define DECODER_NETWORK_LIST(X)                                                                              \
     X(OPACITY, "opacity", 1)                                                                                 \
     X(SHAPE, "shape", 7)                                                                                     \
     X(COLOR, "colour", 3)
 
 enum {
 #define X(id, label, outputs) DECODER_##id,
-    DECODER_PART_LIST(X)
+    DECODER_NETWORK_LIST(X)
 #undef X
-        DECODER_PARTS
+        DECODER_NETWORKS
 };
 
-/** Which of decoder.params are a network's. */
-typedef struct decoder_part {
+/** Outputs for each Gaussian. */
+enum {
+#define X(id, label, outputs) DECODER_##id##_OUTPUTS = outputs,
+    DECODER_NETWORK_LIST(X)
+#undef X
+};
+
+/** A network, and which of decoder.params are its. */
+typedef struct decoder_network {
     const char *label;
     size_t outputs; /* for each Gaussian */
     size_t begin, end;
-} decoder_part;
-void decoder_parts(const decoder *d, decoder_part parts[DECODER_PARTS]);
+} decoder_network;
+void decoder_networks(const decoder *d, decoder_network networks[DECODER_NETWORKS]);
 
 #endif

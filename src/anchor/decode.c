@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* anchor/decode.c -- anchors + camera centre -> Gaussians.
 
-   visible rows --> input --> opacity network --count per chunk--> prefix sum
-        --> rows that have Gaussians --> shape and colour networks --> packed arrays
+   visible anchors --> input --> opacity network --count per chunk--> prefix sum
+        --> anchors that have Gaussians --> shape and colour networks --> packed arrays
                             (kept for the adjoint)
 
    Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
@@ -34,7 +34,7 @@ typedef struct forward_job {
 
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
-static void decide_rows(const forward_job *job, size_t begin, size_t end)
+static void decide_chunk(const forward_job *job, size_t begin, size_t end)
 {
     decode_tape *tape = job->tape;
     const size_t rows = end - begin, tiled = decode_tiled(rows), offsets = job->layout.offset_count;
@@ -43,16 +43,16 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
         logits[DECODE_CHUNK * ALPHA_STRIDE];
     decode_views(job->a, job->d, tape->camera, tape->visible + begin, rows, view);
     decode_inputs(job->a, tape->visible + begin, view, rows, input);
-    decode_hidden(job->kernels, &job->weights, input, tiled, 0, 1, hidden);
+    decode_hidden(job->kernels, &job->weights, input, tiled, DECODER_OPACITY, DECODER_OPACITY + 1, hidden);
     job->kernels->product(&(dense_product){.m = tiled,
                                            .n = ALPHA_STRIDE,
                                            .k = ANCHOR_HIDDEN_DIM,
                                            .a = hidden,
                                            .a_row = ANCHOR_HIDDEN_DIM,
                                            .a_step = 1,
-                                           .b = job->weights.hidden_out[0],
+                                           .b = job->weights.hidden_out[DECODER_OPACITY],
                                            .b_row = ALPHA_STRIDE,
-                                           .bias = job->weights.out_bias[0],
+                                           .bias = job->weights.out_bias[DECODER_OPACITY],
                                            .c = logits,
                                            .c_row = ALPHA_STRIDE});
     for (size_t r = 0; r < rows; r++)
@@ -70,7 +70,7 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
         }
         tape->opacity_sum[begin + r] = sum;
         if (kept > before)
-            tape->row[begin + filled++] = (uint32_t)(begin + r);
+            tape->place[begin + filled++] = (uint32_t)(begin + r);
     }
     tape->first[begin / DECODE_CHUNK] = kept;
     tape->filled[begin / DECODE_CHUNK] = (uint32_t)filled;
@@ -79,8 +79,8 @@ static void decide_rows(const forward_job *job, size_t begin, size_t end)
 static void decide_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
-    for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        decide_rows(context, row, smaller_size(row + DECODE_CHUNK, end));
+    for (size_t place = begin; place < end; place += DECODE_CHUNK)
+        decide_chunk(context, place, smaller_size(place + DECODE_CHUNK, end));
 }
 
 /* Logits of the kept Gaussians into their places in the tape, and what needs no activation into `out`. */
@@ -91,23 +91,24 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
     gaussians *out = job->out;
     const size_t offsets = job->layout.offset_count, first = tape->first[begin / DECODE_CHUNK],
                  stride = tape->output_stride;
-    const size_t shape_stride = job->layout.out_stride[1], color_stride = job->layout.out_stride[2];
+    const size_t shape_stride = job->layout.out_stride[DECODER_SHAPE],
+                 color_stride = job->layout.out_stride[DECODER_COLOR];
     float *kept = tape->output;
     size_t g = first;
     for (size_t r = 0; r < rows; r++) {
-        const size_t row = tape->row[begin + r], anchor = tape->visible[row];
-        const float *alpha = tape->alpha + row * offsets, *e = extent + r * 6;
+        const size_t place = tape->place[begin + r], anchor = tape->visible[place];
+        const float *alpha = tape->alpha + place * offsets, *e = extent + r * 6;
         const float *x = job->a->position + anchor * 3, *offset = job->a->offset + anchor * offsets * 3;
         for (size_t k = 0; k < offsets; k++) {
             if (!(alpha[k] > job->opacity_min))
                 continue;
-            const float *s = shape + r * shape_stride + k * SHAPE_OUTPUTS,
-                        *c = color + r * color_stride + k * COLOR_OUTPUTS;
+            const float *s = shape + r * shape_stride + k * DECODER_SHAPE_OUTPUTS,
+                        *c = color + r * color_stride + k * DECODER_COLOR_OUTPUTS;
             kept[KEPT_ALPHA * stride + g] = alpha[k];
-            for (int i = 0; i < SHAPE_OUTPUTS; i++) /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs
-                                                       do */
+            /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs do. */
+            for (int i = 0; i < DECODER_SHAPE_OUTPUTS; i++)
                 kept[(size_t)(KEPT_SIGMOID + i) * stride + g] = s[i];
-            for (int i = 0; i < COLOR_OUTPUTS; i++)
+            for (int i = 0; i < DECODER_COLOR_OUTPUTS; i++)
                 kept[(size_t)(KEPT_COLOR + i) * stride + g] = c[i];
             out->opacity[g] = alpha[k];
             out->mean_x[g] =
@@ -116,7 +117,7 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
                 activation_clamp(x[1] + offset[k * 3 + 1] * e[1], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
             out->mean_z[g] =
                 activation_clamp(x[2] + offset[k * 3 + 2] * e[2], -DECODE_MEAN_LIMIT, DECODE_MEAN_LIMIT);
-            tape->slot[g] = (uint32_t)(row * offsets + k);
+            tape->slot[g] = (uint32_t)(place * offsets + k);
             row_of[g - first] = (uint16_t)r;
             g++;
         }
@@ -135,36 +136,36 @@ FASTEST_CLONE static void hold_ratio(float *const scale[3], size_t count)
     }
 }
 
-static void emit_rows(const forward_job *job, size_t begin)
+static void emit_chunk(const forward_job *job, size_t begin)
 {
     decode_tape *tape = job->tape;
     const size_t rows = tape->filled[begin / DECODE_CHUNK], tiled = decode_tiled(rows);
-    const uint32_t *row = tape->row + begin;
-    enum { HIDDEN = (HEAD_COUNT - 1) * ANCHOR_HIDDEN_DIM };
+    const uint32_t *place = tape->place + begin;
+    enum { AFTER_OPACITY = DECODER_NETWORKS - DECODER_SHAPE, HIDDEN = AFTER_OPACITY * ANCHOR_HIDDEN_DIM };
     _Alignas(64) float input[DECODE_CHUNK * INPUT_STRIDE], hidden[DECODE_CHUNK * HIDDEN],
         shape[DECODE_CHUNK * SHAPE_STRIDE_MAX], color[DECODE_CHUNK * COLOR_STRIDE_MAX],
         extent[DECODE_CHUNK * 6], view[DECODE_CHUNK * VIEW_COUNT];
     uint16_t row_of[CHUNK_SLOTS];
     uint32_t anchor[DECODE_CHUNK];
-    float *const logits[2] = {shape, color};
+    float *const logits[AFTER_OPACITY] = {shape, color};
     for (size_t r = 0; r < rows; r++) {
-        anchor[r] = tape->visible[row[r]];
-        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)row[r] * VIEW_COUNT, VIEW_COUNT * sizeof *view);
+        anchor[r] = tape->visible[place[r]];
+        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)place[r] * VIEW_COUNT, VIEW_COUNT * sizeof *view);
     }
     decode_inputs(job->a, anchor, view, rows, input);
-    decode_hidden(job->kernels, &job->weights, input, tiled, 1, HEAD_COUNT, hidden);
-    for (int head = 1; head <= 2; head++) {
-        const size_t stride = job->layout.out_stride[head];
+    decode_hidden(job->kernels, &job->weights, input, tiled, DECODER_SHAPE, DECODER_NETWORKS, hidden);
+    for (int network = DECODER_SHAPE; network < DECODER_NETWORKS; network++) {
+        const size_t stride = job->layout.out_stride[network];
         job->kernels->product(&(dense_product){.m = tiled,
                                                .n = stride,
                                                .k = ANCHOR_HIDDEN_DIM,
-                                               .a = hidden + (head - 1) * ANCHOR_HIDDEN_DIM,
+                                               .a = hidden + (network - DECODER_SHAPE) * ANCHOR_HIDDEN_DIM,
                                                .a_row = HIDDEN,
                                                .a_step = 1,
-                                               .b = job->weights.hidden_out[head],
+                                               .b = job->weights.hidden_out[network],
                                                .b_row = stride,
-                                               .bias = job->weights.out_bias[head],
-                                               .c = logits[head - 1],
+                                               .bias = job->weights.out_bias[network],
+                                               .c = logits[network - DECODER_SHAPE],
                                                .c_row = stride});
     }
     for (size_t r = 0; r < rows; r++)
@@ -199,23 +200,23 @@ static void emit_rows(const forward_job *job, size_t begin)
 static void emit_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
-    for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        emit_rows(context, row);
+    for (size_t place = begin; place < end; place += DECODE_CHUNK)
+        emit_chunk(context, place);
 }
 
-static gbt_status reserve_rows(decode_tape *tape, size_t visible_count, gbt_error *err)
+static gbt_status reserve_places(decode_tape *tape, size_t visible_count, gbt_error *err)
 {
-    const size_t rows = decode_tiled(visible_count);
+    const size_t places = decode_tiled(visible_count);
     const size_t chunks = parallel_block_count(visible_count, DECODE_CHUNK);
     GBT_TRY(mem_reserve((void **)&tape->first, &tape->first_capacity, 0, chunks + 1, sizeof *tape->first,
                         "decode tape", err));
     GBT_TRY(mem_reserve((void **)&tape->filled, &tape->filled_capacity, 0, chunks, sizeof *tape->filled,
                         "decode tape", err));
-    GBT_TRY(mem_reserve((void **)&tape->row, &tape->row_capacity, 0, rows, sizeof *tape->row, "decode tape",
-                        err));
-    if (rows <= tape->capacity && tape->alpha != NULL)
+    GBT_TRY(mem_reserve((void **)&tape->place, &tape->place_capacity, 0, places, sizeof *tape->place,
+                        "decode tape", err));
+    if (places <= tape->capacity && tape->alpha != NULL)
         return GBT_OK;
-    const size_t capacity = decode_tiled(rows + rows / 4);
+    const size_t capacity = decode_tiled(places + places / 4);
     float *block = /* one owner (alpha), three arrays */
         mem_alloc(capacity, (ALPHA_STRIDE + 1 + VIEW_COUNT) * sizeof *block, "decode tape", err);
     if (block == NULL)
@@ -281,7 +282,7 @@ gbt_status decode_forward(const anchors *a, const decoder *d, const float camera
                        .out = out,
                        .tape = tape};
     GBT_TRY(decode_pack_weights(d, &job.layout, tape, &job.weights, err));
-    GBT_TRY(reserve_rows(tape, visible_count, err));
+    GBT_TRY(reserve_places(tape, visible_count, err));
     tape->visible = visible;
     memcpy(tape->camera, camera_center, sizeof tape->camera);
     parallel_blocks(visible_count, DECODE_GRAIN, decide_block, &job);
@@ -309,7 +310,7 @@ void decode_tape_free(decode_tape *tape)
     mem_free(tape->output);
     mem_free(tape->first);
     mem_free(tape->filled);
-    mem_free(tape->row);
+    mem_free(tape->place);
     mem_free(tape->weights);
     mem_free(tape->block_grad);
     mem_free(tape->slot);

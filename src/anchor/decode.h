@@ -12,23 +12,24 @@
 typedef struct decode_tape {
     size_t visible_count, capacity;
     const uint32_t *visible; /* borrowed from decode_forward() until decode_backward() returns */
-    float *alpha;            /* internal: opacities, kept or not, one row per visible anchor */
-    uint32_t *row;           /* internal: the visible rows that have Gaussians, those of a chunk together */
-    uint32_t *filled;        /* internal: how many there are in each chunk */
-    float camera[3];         /* internal: the camera's centre */
-    float *view;             /* internal: direction and distance, or 0, of each visible anchor */
-    float *output; /* internal: activations of the kept Gaussians, one array per field of `output_stride`
-                      floats */
+    float *alpha;            /* internal: opacities, kept or not, of each visible anchor */
+    uint32_t *place;  /* internal: places in `visible` of the anchors that have Gaussians, those of a chunk
+                         together */
+    uint32_t *filled; /* internal: how many there are in each chunk */
+    float camera[3];  /* internal: the camera's centre */
+    float *view;      /* internal: direction and distance, or 0, of each visible anchor */
+    float *output;    /* internal: activations of the kept Gaussians, one array per field of `output_stride`
+                         floats */
     size_t output_stride;
     size_t kept_count;
-    size_t *first; /* internal: first kept Gaussian of each chunk of rows */
-    size_t first_capacity, filled_capacity, row_capacity;
+    size_t *first; /* internal: first kept Gaussian of each chunk */
+    size_t first_capacity, filled_capacity, place_capacity;
     float *weights; /* internal: the networks as the kernels read them */
     size_t weight_capacity;
     size_t block_capacity; /* floats */
     float *block_grad;     /* internal: one decoder gradient per block, summed in block order */
-    uint32_t *slot; /* [gaussian count]: visible row * K + offset, ascending: which slot each Gaussian came
-                       from */
+    uint32_t *slot; /* [gaussian count]: place in `visible` * K + offset, ascending: which slot each Gaussian
+                       came from */
     size_t slot_capacity;
     float *opacity_sum; /* [visible_count]: sum over offsets of max(alpha, 0): see GROWTH_BY_OPACITY */
 } decode_tape;
@@ -42,7 +43,8 @@ typedef struct decode_tape {
  * sigmoid(.). Log-scales are cut to [-30, 30], where their gradient ends; sigmoid's arguments to [-30, 30]
  * and tanh's to [-10, 10], where their slopes, taken from the values, are almost 0. A scale below 1e-4 of the
  * Gaussian's largest is raised to that: its gradient is then the largest one's. It is kept iff its alpha >
- * `opacity_min` (0 = the reference's rule); kept ones are packed in (visible row, offset) order.
+ * `opacity_min` (0 = the reference's rule); kept ones are packed in the order of (place in `visible`,
+ * offset).
  *
  * @param visible [in] [visible_count] anchor indices, ascending; borrowed until decode_backward()
  * @param out     [out] resized and padded; out->count kept Gaussians; all finite for finite parameters

@@ -18,7 +18,8 @@ typedef struct batch_in {
 } batch_in;
 
 typedef struct batch_out {
-    float offset[3][BATCH], scale_log[6][BATCH], alpha[BATCH], shape[SHAPE_OUTPUTS][BATCH], color[3][BATCH];
+    float offset[3][BATCH], scale_log[6][BATCH], alpha[BATCH], shape[DECODER_SHAPE_OUTPUTS][BATCH],
+        color[DECODER_COLOR_OUTPUTS][BATCH];
 } batch_out;
 
 /* Means and offsets. */
@@ -106,12 +107,12 @@ static size_t gather(const decode_slopes *s, size_t g, size_t count, size_t r, b
                      size_t row[BATCH], size_t k[BATCH])
 {
     const size_t offsets = s->layout->offset_count;
-    const uint32_t *slot = s->tape->slot + g, *visible_row = s->tape->row + s->begin;
+    const uint32_t *slot = s->tape->slot + g, *place = s->tape->place + s->begin;
     for (size_t i = 0; i < count; i++) {
-        while (slot[i] >= (visible_row[r] + 1) * offsets)
+        while (slot[i] >= (place[r] + 1) * offsets)
             r++;
         row[i] = r;
-        k[i] = slot[i] - visible_row[r] * offsets;
+        k[i] = slot[i] - place[r] * offsets;
         const float *position = s->a->position + (size_t)s->anchor[r] * 3,
                     *offset = s->a->offset + ((size_t)s->anchor[r] * offsets + k[i]) * 3;
         for (int c = 0; c < 3; c++) {
@@ -130,12 +131,12 @@ static void scatter(const decode_slopes *s, const batch_out *out, size_t count, 
     const decode_layout *layout = s->layout;
     for (size_t i = 0; i < count; i++) {
         float *logits = s->d_out + row[i] * layout->out_width, *scale_log = s->d_scale_log + row[i] * 6;
-        float *shape = logits + layout->out_first[1] + k[i] * SHAPE_OUTPUTS,
-              *color = logits + layout->out_first[2] + k[i] * COLOR_OUTPUTS;
-        logits[k[i]] = out->alpha[i];
-        for (int c = 0; c < SHAPE_OUTPUTS; c++)
+        float *shape = logits + layout->out_first[DECODER_SHAPE] + k[i] * DECODER_SHAPE_OUTPUTS,
+              *color = logits + layout->out_first[DECODER_COLOR] + k[i] * DECODER_COLOR_OUTPUTS;
+        logits[layout->out_first[DECODER_OPACITY] + k[i]] = out->alpha[i];
+        for (int c = 0; c < DECODER_SHAPE_OUTPUTS; c++)
             shape[c] = out->shape[c][i];
-        for (int c = 0; c < 3; c++)
+        for (int c = 0; c < DECODER_COLOR_OUTPUTS; c++)
             color[c] = out->color[c][i];
         for (int c = 0; c < 6; c++)
             scale_log[c] += out->scale_log[c][i];

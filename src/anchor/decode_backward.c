@@ -18,9 +18,9 @@
 enum { OUT_WIDTH_MAX = ALPHA_STRIDE + SHAPE_STRIDE_MAX + COLOR_STRIDE_MAX };
 
 /* A block's record: gradients of W1 transposed, [INPUT_STRIDE][HIDDEN_STRIDE], with the bias as a row; then
-   of W2 and b2 per head. */
+   of W2 and b2 per network. */
 typedef struct record_layout {
-    size_t weight_first[HEAD_COUNT], bias_first[HEAD_COUNT], size;
+    size_t weight_first[DECODER_NETWORKS], bias_first[DECODER_NETWORKS], size;
 } record_layout;
 
 typedef struct backward_job {
@@ -44,11 +44,11 @@ static const float zeros[HIDDEN_STRIDE];
 static record_layout record_layout_of(const decode_layout *layout)
 {
     record_layout record = {.size = HIDDEN_STRIDE * INPUT_STRIDE};
-    for (int head = 0; head < HEAD_COUNT; head++) {
-        record.weight_first[head] = record.size;
-        record.size += layout->out_count[head] * ANCHOR_HIDDEN_DIM;
-        record.bias_first[head] = record.size;
-        record.size += layout->out_stride[head];
+    for (int network = 0; network < DECODER_NETWORKS; network++) {
+        record.weight_first[network] = record.size;
+        record.size += layout->out_count[network] * ANCHOR_HIDDEN_DIM;
+        record.bias_first[network] = record.size;
+        record.size += layout->out_stride[network];
     }
     return record;
 }
@@ -66,18 +66,18 @@ FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, si
 static void hidden_backward(const backward_job *job, const float *hidden, size_t tiled, const float *d_out,
                             float *d_hidden)
 {
-    for (int head = 0; head < HEAD_COUNT; head++)
+    for (int network = 0; network < DECODER_NETWORKS; network++)
         job->kernels->product(&(dense_product){.m = tiled,
                                                .n = ANCHOR_HIDDEN_DIM,
-                                               .k = job->layout.out_count[head],
-                                               .a = d_out + job->layout.out_first[head],
+                                               .k = job->layout.out_count[network],
+                                               .a = d_out + job->layout.out_first[network],
                                                .a_row = job->layout.out_width,
                                                .a_step = 1,
-                                               .b = job->weights.out_hidden[head],
+                                               .b = job->weights.out_hidden[network],
                                                .b_row = ANCHOR_HIDDEN_DIM,
                                                .bias = zeros,
-                                               .gate = hidden + head * ANCHOR_HIDDEN_DIM,
-                                               .c = d_hidden + head * ANCHOR_HIDDEN_DIM,
+                                               .gate = hidden + network * ANCHOR_HIDDEN_DIM,
+                                               .c = d_hidden + network * ANCHOR_HIDDEN_DIM,
                                                .c_row = HIDDEN_STRIDE});
 }
 
@@ -112,20 +112,20 @@ static void networks_backward(const backward_job *job, size_t rows, const float 
                               const float *d_out, const float *d_hidden, float *record)
 {
     const decode_layout *layout = &job->layout;
-    for (int head = 0; head < HEAD_COUNT; head++) {
-        const float *d_logit = d_out + layout->out_first[head];
-        job->kernels->product(&(dense_product){.m = layout->out_count[head],
+    for (int network = 0; network < DECODER_NETWORKS; network++) {
+        const float *d_logit = d_out + layout->out_first[network];
+        job->kernels->product(&(dense_product){.m = layout->out_count[network],
                                                .n = ANCHOR_HIDDEN_DIM,
                                                .k = rows,
                                                .a = d_logit,
                                                .a_row = 1,
                                                .a_step = layout->out_width,
-                                               .b = hidden + head * ANCHOR_HIDDEN_DIM,
+                                               .b = hidden + network * ANCHOR_HIDDEN_DIM,
                                                .b_row = HIDDEN_STRIDE,
-                                               .c = record + job->record.weight_first[head],
+                                               .c = record + job->record.weight_first[network],
                                                .c_row = ANCHOR_HIDDEN_DIM});
-        add_rows(d_logit, rows, layout->out_width, layout->out_stride[head],
-                 record + job->record.bias_first[head]);
+        add_rows(d_logit, rows, layout->out_width, layout->out_stride[network],
+                 record + job->record.bias_first[network]);
     }
     job->kernels->product(&(dense_product){.m = INPUT_STRIDE,
                                            .n = HIDDEN_STRIDE,
@@ -158,11 +158,11 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
         view[DECODE_CHUNK * VIEW_COUNT];
     uint32_t anchor[DECODE_CHUNK], target[DECODE_CHUNK];
     for (size_t r = 0; r < rows; r++) {
-        const uint32_t row = tape->row[begin + r];
-        anchor[r] = tape->visible[row];
-        target[r] = job->packed ? row : anchor[r];
+        const uint32_t place = tape->place[begin + r];
+        anchor[r] = tape->visible[place];
+        target[r] = job->packed ? place : anchor[r];
         memcpy(extent + r * 6, job->a->scale_log + (size_t)anchor[r] * 6, 6 * sizeof *extent);
-        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)row * VIEW_COUNT, VIEW_COUNT * sizeof *view);
+        memcpy(view + r * VIEW_COUNT, tape->view + (size_t)place * VIEW_COUNT, VIEW_COUNT * sizeof *view);
     }
     job->kernels->exp(extent, rows * 6);
     memset(d_out, 0, tiled * job->layout.out_width * sizeof *d_out);
@@ -182,7 +182,7 @@ static void chunk_backward(const backward_job *job, size_t begin, size_t rows, f
         tape->first[chunk], tape->first[chunk + 1]);
 
     decode_inputs(job->a, anchor, view, rows, input);
-    decode_hidden(job->kernels, &job->weights, input, tiled, 0, HEAD_COUNT, hidden);
+    decode_hidden(job->kernels, &job->weights, input, tiled, DECODER_OPACITY, DECODER_NETWORKS, hidden);
     hidden_backward(job, hidden, tiled, d_out, d_hidden);
     if (job->d_anchors == NULL) {
         for (size_t r = 0; r < rows; r++)
@@ -218,9 +218,9 @@ static void backward_block(size_t block, size_t begin, size_t end, void *context
     double *d_camera = job->d_camera != NULL ? job->d_camera + 3 * block : NULL;
     if (record != NULL)
         memset(record, 0, job->record.size * sizeof *record);
-    for (size_t row = begin; row < end; row += DECODE_CHUNK)
-        if (tape->filled[row / DECODE_CHUNK] > 0)
-            chunk_backward(job, row, tape->filled[row / DECODE_CHUNK], record, d_camera);
+    for (size_t place = begin; place < end; place += DECODE_CHUNK)
+        if (tape->filled[place / DECODE_CHUNK] > 0)
+            chunk_backward(job, place, tape->filled[place / DECODE_CHUNK], record, d_camera);
 }
 
 /* Entries [entry, entry + count) of the records, summed in block order. */
@@ -243,20 +243,21 @@ static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
                 continue;
             sum_records(job, row * HIDDEN_STRIDE, HIDDEN_STRIDE, sum);
             for (size_t column = 0; column < HIDDEN_STRIDE; column++) {
-                const size_t head = column / ANCHOR_HIDDEN_DIM, h = column % ANCHOR_HIDDEN_DIM;
-                float *d_weight = job->d_params + job->layout.param_first[head];
+                const size_t network = column / ANCHOR_HIDDEN_DIM, h = column % ANCHOR_HIDDEN_DIM;
+                float *d_weight = job->d_params + job->layout.param_first[network];
                 d_weight[row == INPUT_ONE ? ANCHOR_HIDDEN_DIM * in + h : h * in + row] += sum[column];
             }
         } else {
-            size_t head = 0, o = row - INPUT_STRIDE;
-            for (; o >= job->layout.out_count[head]; head++)
-                o -= job->layout.out_count[head];
-            float *d_weight = job->d_params + job->layout.param_first[head] + ANCHOR_HIDDEN_DIM * (in + 1);
-            sum_records(job, job->record.weight_first[head] + o * ANCHOR_HIDDEN_DIM, ANCHOR_HIDDEN_DIM, sum);
+            size_t network = 0, o = row - INPUT_STRIDE;
+            for (; o >= job->layout.out_count[network]; network++)
+                o -= job->layout.out_count[network];
+            float *d_weight = job->d_params + job->layout.param_first[network] + ANCHOR_HIDDEN_DIM * (in + 1);
+            sum_records(job, job->record.weight_first[network] + o * ANCHOR_HIDDEN_DIM, ANCHOR_HIDDEN_DIM,
+                        sum);
             for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++)
                 d_weight[o * ANCHOR_HIDDEN_DIM + h] += sum[h];
-            sum_records(job, job->record.bias_first[head] + o, 1, sum);
-            d_weight[job->layout.out_count[head] * ANCHOR_HIDDEN_DIM + o] += sum[0];
+            sum_records(job, job->record.bias_first[network] + o, 1, sum);
+            d_weight[job->layout.out_count[network] * ANCHOR_HIDDEN_DIM + o] += sum[0];
         }
     }
 }
@@ -298,8 +299,8 @@ gbt_status decode_backward(const anchors *a, const decoder *d, decode_tape *tape
     job.d_params = d_params;
     job.record = record_layout_of(&job.layout);
     size_t row_count = INPUT_STRIDE;
-    for (int head = 0; head < HEAD_COUNT; head++)
-        row_count += job.layout.out_count[head];
+    for (int network = 0; network < DECODER_NETWORKS; network++)
+        row_count += job.layout.out_count[network];
     void *records = tape->block_grad;
     GBT_TRY(mem_reserve(&records, &tape->block_capacity, 0, job.block_count * job.record.size, sizeof(float),
                         "decode adjoint", err));

@@ -55,18 +55,18 @@ void decode_inputs(const anchors *a, const uint32_t *which, const float *view, s
 }
 
 void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,
-                   size_t tiled, int head, int end, float *hidden)
+                   size_t tiled, int first, int end, float *hidden)
 {
-    const int first = head * ANCHOR_HIDDEN_DIM, count = (end - head) * ANCHOR_HIDDEN_DIM;
+    const int column = first * ANCHOR_HIDDEN_DIM, count = (end - first) * ANCHOR_HIDDEN_DIM;
     kernels->product(&(dense_product){.m = tiled,
                                       .n = (size_t)count,
                                       .k = INPUT_COUNT,
                                       .a = input,
                                       .a_row = INPUT_STRIDE,
                                       .a_step = 1,
-                                      .b = weights->input_hidden + first,
+                                      .b = weights->input_hidden + column,
                                       .b_row = HIDDEN_STRIDE,
-                                      .bias = weights->hidden_bias + first,
+                                      .bias = weights->hidden_bias + column,
                                       .relu = true,
                                       .c = hidden,
                                       .c_row = (size_t)count});

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_layout.h -- how the files of the decoder lay out rows, heads and packed networks in memory,
-   and what they share.
+/* anchor/decode_layout.h -- how the files of the decoder lay out anchors and packed networks in memory, and
+   what they share.
 
-   One row per visible anchor. The visible anchors are cut into chunks of DECODE_CHUNK rows, whose scratch
-   stays in the second-level cache; a parallel block is DECODE_GRAIN rows. Both are multiples of the register
-   tile, so only the very last chunk has rows to pad. */
+   An anchor's place is its index in `visible`. Places are cut into chunks of DECODE_CHUNK, whose scratch
+   stays in the second-level cache; a parallel block is DECODE_GRAIN places. A row is an anchor's in the
+   scratch of its chunk: for each place of the chunk one, or for those alone that have Gaussians. Both sizes
+   are multiples of the register tile, so chunks that are full of rows need no padding. */
 #ifndef GBT_ANCHOR_DECODE_LAYOUT_H
 #define GBT_ANCHOR_DECODE_LAYOUT_H
 
@@ -21,13 +22,10 @@ enum {
     INPUT_COUNT = ANCHOR_FEATURE_DIM + VIEW_COUNT,
     INPUT_ONE = INPUT_COUNT, /* a column of ones: it turns the bias gradient into one more weight gradient */
     INPUT_STRIDE = 40,       /* a multiple of the register tile: inputs are rows of a product, too */
-    HEAD_COUNT = DECODER_PARTS, /* opacity, shape, colour */
-    HIDDEN_STRIDE = HEAD_COUNT * ANCHOR_HIDDEN_DIM,
+    HIDDEN_STRIDE = DECODER_NETWORKS * ANCHOR_HIDDEN_DIM,
     ALPHA_STRIDE = ANCHOR_MAX_OFFSETS,
-    SHAPE_OUTPUTS = 7,
-    COLOR_OUTPUTS = 3,
-    SHAPE_STRIDE_MAX = SHAPE_OUTPUTS * ANCHOR_MAX_OFFSETS,
-    COLOR_STRIDE_MAX = COLOR_OUTPUTS * ANCHOR_MAX_OFFSETS,
+    SHAPE_STRIDE_MAX = DECODER_SHAPE_OUTPUTS * ANCHOR_MAX_OFFSETS,
+    COLOR_STRIDE_MAX = DECODER_COLOR_OUTPUTS * ANCHOR_MAX_OFFSETS,
     CHUNK_SLOTS = DECODE_CHUNK * ANCHOR_MAX_OFFSETS
 };
 
@@ -49,11 +47,11 @@ enum {
 #define DECODE_SCALE_RATIO 1e-4f
 
 typedef struct decode_layout {
-    size_t offset_count, input_count;        /* input_count is the decoder's own: 35 or 36 */
-    size_t out_count[HEAD_COUNT];            /* K, 7K, 3K */
-    size_t out_stride[HEAD_COUNT];           /* the same, rounded up to DENSE_COLUMNS */
-    size_t out_first[HEAD_COUNT], out_width; /* the heads' outputs side by side, so rounded up */
-    size_t param_first[HEAD_COUNT];          /* of the head's part in decoder.params: W1, b1, W2, b2 */
+    size_t offset_count, input_count;              /* input_count is the decoder's own: 35 or 36 */
+    size_t out_count[DECODER_NETWORKS];            /* K, 7K, 3K */
+    size_t out_stride[DECODER_NETWORKS];           /* the same, rounded up to DENSE_COLUMNS */
+    size_t out_first[DECODER_NETWORKS], out_width; /* the networks' outputs side by side, so rounded up */
+    size_t param_first[DECODER_NETWORKS];          /* of the network in decoder.params: W1, b1, W2, b2 */
 } decode_layout;
 
 decode_layout decode_layout_of(const decoder *d);
@@ -66,12 +64,12 @@ static inline size_t decode_tiled(size_t rows)
 
 /** The networks as the kernels read them; every array points into one block. */
 typedef struct decode_weights {
-    float *input_hidden;           /* [INPUT_COUNT][HIDDEN_STRIDE] */
-    float *hidden_bias;            /* [HIDDEN_STRIDE] */
-    float *hidden_input;           /* [HIDDEN_STRIDE][ANCHOR_FEATURE_DIM] */
-    float *hidden_out[HEAD_COUNT]; /* [ANCHOR_HIDDEN_DIM][out_stride] */
-    float *out_bias[HEAD_COUNT];   /* [out_stride] */
-    float *out_hidden[HEAD_COUNT]; /* [out_count][ANCHOR_HIDDEN_DIM] */
+    float *input_hidden;                 /* [INPUT_COUNT][HIDDEN_STRIDE] */
+    float *hidden_bias;                  /* [HIDDEN_STRIDE] */
+    float *hidden_input;                 /* [HIDDEN_STRIDE][ANCHOR_FEATURE_DIM] */
+    float *hidden_out[DECODER_NETWORKS]; /* [ANCHOR_HIDDEN_DIM][out_stride] */
+    float *out_bias[DECODER_NETWORKS];   /* [out_stride] */
+    float *out_hidden[DECODER_NETWORKS]; /* [out_count][ANCHOR_HIDDEN_DIM] */
 } decode_weights;
 
 /**
@@ -91,9 +89,10 @@ void decode_views(const anchors *a, const decoder *d, const float camera[3], con
  */
 void decode_inputs(const anchors *a, const uint32_t *which, const float *view, size_t rows, float *input);
 
-/** Hidden layers of the heads [head, end): hidden [tiled][(end - head) * ANCHOR_HIDDEN_DIM], after ReLU. */
+/** Hidden layers of the networks [first, end): hidden [tiled][(end - first) * ANCHOR_HIDDEN_DIM], after ReLU.
+ */
 void decode_hidden(const dense_kernels *kernels, const decode_weights *weights, const float *input,
-                   size_t tiled, int head, int end, float *hidden);
+                   size_t tiled, int first, int end, float *hidden);
 
 /** Pack the networks into tape->weights (grown as needed). */
 gbt_status decode_pack_weights(const decoder *d, const decode_layout *layout, decode_tape *tape,
@@ -105,7 +104,7 @@ typedef struct decode_slopes {
     const decode_tape *tape;
     const decode_layout *layout;
     const gaussians *d_gaussians;
-    size_t begin;                          /* the chunk's first row in tape->row */
+    size_t begin;                          /* the chunk's first entry in tape->place */
     const uint32_t *anchor, *target;       /* [rows]: the anchors, and their rows in d_offset */
     const float *extent;                   /* [rows][6]: exp of the log-scales */
     float *d_out, *d_scale_log, *d_offset; /* [rows][out_width], [rows][6], [...][K][3] or NULL: added to, but

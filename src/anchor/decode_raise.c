@@ -8,10 +8,10 @@
 
 void decode_raise_opacity(const decode_tape *tape, float least, float opacity, decoder *d)
 {
-    decoder_part parts[HEAD_COUNT];
-    decoder_parts(d, parts);
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(d, networks);
     const size_t offsets = (size_t)d->offset_count;
-    float *bias = d->params + parts[0].end - offsets;
+    float *bias = d->params + networks[DECODER_OPACITY].end - offsets;
     for (size_t k = 0; k < offsets && tape->visible_count > 0; k++) {
         double sum = 0;
         for (size_t v = 0; v < tape->visible_count; v++)

@@ -6,7 +6,7 @@
 
 enum {
     LANES = 16,
-    TILE_ROWS = 10 /* 20 of 32 registers hold sums; 10 divides every head of the default K = 10 */
+    TILE_ROWS = 10 /* 20 of 32 registers hold sums; 10 divides the outputs of every network for K = 10 */
 };
 typedef __m512 vec;
 #define vec_load _mm512_loadu_ps

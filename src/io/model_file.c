@@ -68,9 +68,9 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         return base_fail(err, failure,
                          "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
                          UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(d, parts);
-    const size_t param_count = parts[DECODER_PARTS - 1].end;
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(d, networks);
+    const size_t param_count = networks[DECODER_NETWORKS - 1].end;
     if (d->offset_count != a->offset_count || d->param_count != param_count)
         return base_fail(
             err, failure,

@@ -59,13 +59,13 @@ static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 gbt_status model_parts_make(model_parts *p, size_t count, int offset_count, bool has_pixel, bool has_distance,
                             bool coarse, gbt_error *err)
 {
-    decoder_part networks[DECODER_PARTS];
-    decoder_parts(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(&(decoder){.offset_count = offset_count, .has_distance = has_distance}, networks);
     *p = (model_parts){.coarse = coarse,
                        .count = count,
                        .offset_count = offset_count,
                        .has_distance = has_distance,
-                       .param_count = networks[DECODER_PARTS - 1].end};
+                       .param_count = networks[DECODER_NETWORKS - 1].end};
     if (coarse)
         return make_coarse(p, has_pixel, err);
     p->anchors.offset_count = offset_count;

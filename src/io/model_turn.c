@@ -88,13 +88,13 @@ static void find_basis(const square sensitivity, const square covariance, square
 /* Rows of W1 as they see the turned features; b1 takes what the mean did. */
 static void turn_networks(decoder *d, const double mean[DIM], const square back)
 {
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(d, parts);
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(d, networks);
     const size_t inputs = DIM + 3 + (d->has_distance ? 1 : 0);
-    for (int head = 0; head < DECODER_PARTS; head++)
+    for (int i = 0; i < DECODER_NETWORKS; i++)
         for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++) {
-            float *w = d->params + parts[head].begin + h * inputs,
-                  *bias = d->params + parts[head].begin + ANCHOR_HIDDEN_DIM * inputs + h;
+            float *w = d->params + networks[i].begin + h * inputs,
+                  *bias = d->params + networks[i].begin + ANCHOR_HIDDEN_DIM * inputs + h;
             double turned[DIM] = {0}, sum = (double)*bias;
             for (size_t c = 0; c < DIM; c++) {
                 sum += (double)w[c] * mean[c];

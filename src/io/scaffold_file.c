@@ -17,7 +17,7 @@
 enum { PATH_SIZE = 4096, DIMENSIONS = 3, SCALES = 6, NETWORKS = 3, VIEW_INPUTS = ANCHOR_FEATURE_DIM + 3 };
 
 static const char *const network_names[NETWORKS] = {"opacity", "cov", "color"}; /* in the order of
-                                                                                   decoder_parts() */
+                                                                                   decoder_networks() */
 static const size_t outputs_per_offset[NETWORKS] = {1, 7, 3};
 
 /* ---- anchors ---- */
@@ -258,11 +258,11 @@ static gbt_status read_decoder(const char *folder, int offset_count, decoder *ou
     if (status == GBT_OK)
         status = decoder_init(out, offset_count, has_distance, 0, err);
     if (status == GBT_OK) {
-        decoder_part parts[NETWORKS];
-        decoder_parts(out, parts);
+        decoder_network ours[NETWORKS];
+        decoder_networks(out, ours);
         out->distance_scale = 1; /* scene units, as they are */
         for (int i = 0; i < NETWORKS; i++)
-            copy_network(&networks[i], VIEW_INPUTS + (has_distance ? 1 : 0), out->params + parts[i].begin);
+            copy_network(&networks[i], VIEW_INPUTS + (has_distance ? 1 : 0), out->params + ours[i].begin);
     }
     for (int i = 0; i < NETWORKS; i++)
         network_free(&networks[i]);

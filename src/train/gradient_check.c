@@ -82,13 +82,13 @@ bool gradient_is_bad(const learnables *g, const frame *f, const decoder *d,
         name_row(&job, f->visible_count, where, size);
         return true;
     }
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(d, parts);
-    for (int i = 0; i < DECODER_PARTS; i++) {
-        const size_t count = parts[i].end - parts[i].begin,
-                     at = first_bad(g->networks + parts[i].begin, count);
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(d, networks);
+    for (int i = 0; i < DECODER_NETWORKS; i++) {
+        const size_t count = networks[i].end - networks[i].begin,
+                     at = first_bad(g->networks + networks[i].begin, count);
         if (at < count) {
-            snprintf(where, size, "%s network, value %zu", parts[i].label, at);
+            snprintf(where, size, "%s network, value %zu", networks[i].label, at);
             return true;
         }
     }

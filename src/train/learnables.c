@@ -31,7 +31,7 @@ static const rate_rule anchor_rules[ANCHOR_FIELDS] = {
     [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own = 4.5, .times_extent = true},
     [ANCHOR_SCALE_LOG] = {.first = 0.007, .last = 0.007, .own = 3, .is_log_scale = true},
 };
-static const rate_rule network_rules[DECODER_PARTS] = {
+static const rate_rule network_rules[DECODER_NETWORKS] = {
     [DECODER_OPACITY] = {.first = 0.002, .last = 0.00002, .own = 2},
     [DECODER_SHAPE] = {.first = 0.004, .last = 0.004, .own = 2},
     [DECODER_COLOR] = {.first = 0.008, .last = 0.00005, .own = 2},
@@ -65,8 +65,8 @@ learning_rates learning_rates_at(double progress, bool own, double geometry_from
         rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor, end);
     if (progress < geometry_from)
         rates.anchor[ANCHOR_OFFSET] = rates.anchor[ANCHOR_SCALE_LOG] = 0;
-    for (int part = 0; part < DECODER_PARTS; part++)
-        rates.network[part] = rate_at(&network_rules[part], progress, own, extent, factor, end);
+    for (int i = 0; i < DECODER_NETWORKS; i++)
+        rates.network[i] = rate_at(&network_rules[i], progress, own, extent, factor, end);
     return rates;
 }
 
@@ -157,12 +157,12 @@ void learn_anchors(const learning_model *m, const learning_rates *rates, uint64_
 
 void learn_networks(const learning_model *m, const learning_rates *rates, uint64_t age)
 {
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(m->decoder, parts);
-    for (int i = 0; i < DECODER_PARTS; i++) {
-        const size_t at = parts[i].begin;
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(m->decoder, networks);
+    for (int i = 0; i < DECODER_NETWORKS; i++) {
+        const size_t at = networks[i].begin;
         adam_step(m->decoder->params + at, m->gradient->networks + at, m->moment1->networks + at,
-                  m->moment2->networks + at, parts[i].end - at,
+                  m->moment2->networks + at, networks[i].end - at,
                   adam_rates_of_views(rates->network[i], age, rates->views));
     }
 }

@@ -27,7 +27,7 @@ gbt_status learnables_follow(learnables *l, const growth_result *result, gbt_err
 
 typedef struct learning_rates {
     double anchor[ANCHOR_FIELDS]; /* of the fields that learn */
-    double network[DECODER_PARTS];
+    double network[DECODER_NETWORKS];
     int views; /* of a step: adam_rates_of_views() */
 } learning_rates;
 

@@ -72,9 +72,9 @@ static void raise_opacities(trainer *t, const step_report *r, double progress)
     cluster_broadcast(t->decoder.params, t->decoder.param_count * sizeof *t->decoder.params);
     if (!lasts)
         return;
-    decoder_part parts[DECODER_PARTS];
-    decoder_parts(&t->decoder, parts);
-    const decoder_part *opacity = &parts[DECODER_OPACITY];
+    decoder_network networks[DECODER_NETWORKS];
+    decoder_networks(&t->decoder, networks);
+    const decoder_network *opacity = &networks[DECODER_OPACITY];
     learnables *const moments[] = {&t->moment1, &t->moment2};
     for (int i = 0; i < 2; i++) /* what pulled the opacities down must not go on */
         memset(moments[i]->networks + opacity->begin, 0, (opacity->end - opacity->begin) * sizeof(float));

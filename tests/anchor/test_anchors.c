@@ -10,13 +10,13 @@ static void sizes_of_the_networks(void **state) /* scaffold-gs: 1482, 3462, 2142
     for (int dist = 0; dist <= 1; dist++) {
         decoder d;
         assert_ok(decoder_init(&d, 10, dist == 1, 7, NULL));
-        decoder_part parts[3];
-        decoder_parts(&d, parts);
+        decoder_network networks[3];
+        decoder_networks(&d, networks);
         size_t at = 0;
         for (int p = 0; p < 3; p++) {
-            assert_int_equal(parts[p].begin, at);
+            assert_int_equal(networks[p].begin, at);
             at += expected[p] + (dist == 1 ? 32 : 0);
-            assert_int_equal(parts[p].end, at);
+            assert_int_equal(networks[p].end, at);
         }
         assert_int_equal(d.param_count, at);
         assert_int_equal(at, dist == 1 ? 7182 : 7086);
@@ -35,19 +35,19 @@ static void first_values_fill_their_interval(void **state)
         assert_ok(decoder_init(&other, 10, dist == 1, 4, NULL));
         assert_memory_equal(d.params, again.params, d.param_count * sizeof(float));
         assert_memory_not_equal(d.params, other.params, d.param_count * sizeof(float));
-        decoder_part parts[3];
-        decoder_parts(&d, parts);
+        decoder_network networks[3];
+        decoder_networks(&d, networks);
         const size_t in = dist == 1 ? 36 : 35;
         for (int p = 0; p < 3; p++) {
-            const size_t first_layer = parts[p].begin + 32 * (in + 1);
-            const size_t bounds_begin[2] = {parts[p].begin, first_layer},
-                         bounds_end[2] = {first_layer, parts[p].end};
+            const size_t first_layer = networks[p].begin + 32 * (in + 1);
+            const size_t bounds_begin[2] = {networks[p].begin, first_layer},
+                         bounds_end[2] = {first_layer, networks[p].end};
             const double bound[2] = {dist == 1 ? 0.16666667 : 0.16903085, 0.17677670};
             const size_t at[4] = {0, 32 * (in + 1) - 1, 32 * (in + 1),
-                                  parts[p].end - parts[p].begin - 1}; /* ends of both layers */
+                                  networks[p].end - networks[p].begin - 1}; /* ends of both layers */
             for (int i = 0; i < 4; i++) {
                 const double want = (2.0 * (double)rng_uniform(3, (uint64_t)p, at[i]) - 1.0) * bound[i / 2];
-                assert_true(fabs((double)d.params[parts[p].begin + at[i]] - want) < 1e-6 * fabs(want));
+                assert_true(fabs((double)d.params[networks[p].begin + at[i]] - want) < 1e-6 * fabs(want));
             }
             for (int layer = 0; layer < 2; layer++) {
                 double low = 1, high = -1, sum = 0;

@@ -249,8 +249,8 @@ static void adjoint_agrees_with_double(void **state)
     widen_camera(camera);
     decode_ref_backward(&r, camera, visible, visible_count, d_out, &grad);
 
-    decoder_part parts[3];
-    decoder_parts(&d, parts);
+    decoder_network networks[3];
+    decoder_networks(&d, networks);
     const struct {
         const char *name;
         const float *got;
@@ -260,9 +260,9 @@ static void adjoint_agrees_with_double(void **state)
         {"features", da.feature, grad.feature, 0, c->count * 32},
         {"offsets", da.offset, grad.offset, 0, c->count * (size_t)c->offset_count * 3},
         {"log-scales", da.scale_log, grad.scale_log, 0, c->count * 6},
-        {"opacity network", dp, grad.params, parts[0].begin, parts[0].end},
-        {"shape network", dp, grad.params, parts[1].begin, parts[1].end},
-        {"colour network", dp, grad.params, parts[2].begin, parts[2].end},
+        {"opacity network", dp, grad.params, networks[0].begin, networks[0].end},
+        {"shape network", dp, grad.params, networks[1].begin, networks[1].end},
+        {"colour network", dp, grad.params, networks[2].begin, networks[2].end},
     };
     for (size_t i = 0; i < 6; i++) {
         const double error =
@@ -376,10 +376,10 @@ static void same_bits_for_all_threads_and_instructions(void **state)
 /* Biases of the opacity head, the last K of its part. */
 static void set_opacity_bias(decoder *d, float value)
 {
-    decoder_part parts[3];
-    decoder_parts(d, parts);
+    decoder_network networks[3];
+    decoder_networks(d, networks);
     for (int k = 0; k < d->offset_count; k++)
-        d->params[parts[0].end - 1 - (size_t)k] = value;
+        d->params[networks[0].end - 1 - (size_t)k] = value;
 }
 
 static void nothing_to_decode(void **state)

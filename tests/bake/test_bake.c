@@ -31,14 +31,15 @@ static void make_world(world *w, bool blind)
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             w->a.scale_log[6 * i + k] = spread(5, 200 + k, i, -2.5f, -0.5f);
-    decoder_part parts[3];
-    decoder_parts(&w->d, parts);
+    decoder_network networks[3];
+    decoder_networks(&w->d, networks);
     for (size_t i = 0; i < OFFSETS; i++)
-        w->d.params[parts[0].end - 1 - i] = 0.7f;
+        w->d.params[networks[0].end - 1 - i] = 0.7f;
     const size_t inputs = ANCHOR_FEATURE_DIM + 4;
     for (int head = 0; head < 3 && blind; head++)
         for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++)
-            memset(w->d.params + parts[head].begin + h * inputs + ANCHOR_FEATURE_DIM, 0, 4 * sizeof(float));
+            memset(w->d.params + networks[head].begin + h * inputs + ANCHOR_FEATURE_DIM, 0,
+                   4 * sizeof(float));
     for (int i = 0; i < CAMERAS; i++)
         w->cameras[i] = ring_camera(i);
     for (int i = 0; i < CAMERAS; i++)
@@ -151,11 +152,11 @@ static void check_means(float bias, size_t *partly, size_t *turned)
     static const double priors[3] = {0, 0.25, 1}, y = 0.28209479177387814;
     world w;
     bake_result r[3];
-    decoder_part parts[3];
+    decoder_network networks[3];
     make_world(&w, false);
-    decoder_parts(&w.d, parts);
+    decoder_networks(&w.d, networks);
     for (size_t k = 0; k < OFFSETS; k++)
-        w.d.params[parts[0].end - 1 - k] = bias;
+        w.d.params[networks[0].end - 1 - k] = bias;
     memset(means, 0, sizeof means);
     look_at_all(&w, means);
     for (int p = 0; p < 3; p++)

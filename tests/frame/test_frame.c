@@ -94,10 +94,10 @@ static world make_world(uint64_t seed)
     for (size_t i = 0; i < ANCHORS; i++)
         for (size_t k = 0; k < 6; k++)
             w.a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -4.0f, -2.0f);
-    decoder_part parts[3];
-    decoder_parts(&w.d, parts);
+    decoder_network networks[3];
+    decoder_networks(&w.d, networks);
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities */
-        w.d.params[parts[0].end - 1 - i] = 0.7f;
+        w.d.params[networks[0].end - 1 - i] = 0.7f;
     w.s.background[1] = 0.3f;
     return w;
 }

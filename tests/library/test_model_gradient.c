@@ -155,10 +155,10 @@ static void make_neural(world *w, double footprint)
     m.decoder.distance_max = 2.5f;
     for (uint64_t i = 0; i < m.decoder.param_count; i++) /* a view that matters */
         m.decoder.params[i] *= 2;
-    decoder_part parts[3];
-    decoder_parts(&m.decoder, parts);
+    decoder_network networks[3];
+    decoder_networks(&m.decoder, networks);
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities */
-        m.decoder.params[parts[0].end - 1 - i] = 0.6f;
+        m.decoder.params[networks[0].end - 1 - i] = 0.6f;
     for (uint32_t i = 0; i < ANCHORS; i++) {
         w->all[i] = i;
         w->anchor_pixel[i] = i % 3 == 0 ? 0.5f : 0;

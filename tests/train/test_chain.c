@@ -45,10 +45,10 @@ static void make_view(view *v, uint64_t seed, bool has_distance)
             v->a.scale_log[6 * i + k] = spread(seed, 200 + k, i, -1.5f, -0.2f);
     v->a.scale_log[6 * (seed % count) + 3 + seed % 3] =
         -14; /* a sheet or needle that the least ratio of scales holds */
-    decoder_part parts[3];
-    decoder_parts(&v->d, parts);
+    decoder_network networks[3];
+    decoder_networks(&v->d, networks);
     for (size_t i = 0; i < OFFSETS; i++) /* biases of the opacities: most Gaussians are there */
-        v->d.params[parts[0].end - 1 - i] = 0.7f;
+        v->d.params[networks[0].end - 1 - i] = 0.7f;
     v->s = trace_settings_default();
     v->s.background[0] = 0.2f;
     v->s.background[1] = 0.4f;
@@ -197,8 +197,8 @@ static void gradient_of(view *v, decode_ref *out)
 
 static size_t class_of(const decoder *d, decode_ref *r, int class, double **out)
 {
-    decoder_part parts[3];
-    decoder_parts(d, parts);
+    decoder_network networks[3];
+    decoder_networks(d, networks);
     switch (class) {
     case 0:
         *out = r->feature;
@@ -210,8 +210,8 @@ static size_t class_of(const decoder *d, decode_ref *r, int class, double **out)
         *out = r->scale_log;
         return r->count * 6;
     default:
-        *out = r->params + parts[class - 3].begin;
-        return parts[class - 3].end - parts[class - 3].begin;
+        *out = r->params + networks[class - 3].begin;
+        return networks[class - 3].end - networks[class - 3].begin;
     }
 }
 
@@ -355,11 +355,14 @@ static void float_chain_agrees_with_double(void **state)
         loss_add_gradient(&v.f.gaussians, volume_weight, &v.f.d_gaussians);
         assert_ok(frame_backward_anchors(&v.f, &v.a, &v.d, &d_anchors, d_params, NULL));
         for (int class = 0; class < CLASS_COUNT; class ++) {
-            decoder_part parts[3];
-            decoder_parts(&v.d, parts);
-            const float *got[CLASS_COUNT] = {d_anchors.feature,         d_anchors.offset,
-                                             d_anchors.scale_log,       d_params + parts[0].begin,
-                                             d_params + parts[1].begin, d_params + parts[2].begin};
+            decoder_network networks[3];
+            decoder_networks(&v.d, networks);
+            const float *got[CLASS_COUNT] = {d_anchors.feature,
+                                             d_anchors.offset,
+                                             d_anchors.scale_log,
+                                             d_params + networks[0].begin,
+                                             d_params + networks[1].begin,
+                                             d_params + networks[2].begin};
             double *w, square = 0, norm = 0;
             const size_t count = class_of(&v.d, &wanted, class, &w);
             for (size_t i = 0; i < count; i++) {

@@ -233,9 +233,9 @@ static void faint_gaussians_count(void **state)
         trainer t;
         step_report r;
         open_ok(&t, tiny, &def);
-        decoder_part parts[DECODER_PARTS];
-        decoder_parts(&t.decoder, parts);
-        const decoder_part *p = &parts[DECODER_OPACITY];
+        decoder_network networks[DECODER_NETWORKS];
+        decoder_networks(&t.decoder, networks);
+        const decoder_network *p = &networks[DECODER_OPACITY];
         memset(t.decoder.params + p->begin, 0, (p->end - p->begin) * sizeof(float));
         for (int k = 0; k < t.def.offsets; k++)
             t.decoder.params[p->end - 1 - (size_t)k] = 0.002f; /* below 1/255 */

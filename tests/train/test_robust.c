@@ -440,8 +440,8 @@ static void a_bad_gradient_is_named(void **state)
     assert_string_equal(where, "untouched");
     const size_t anchor = t.views[0].frame.visible[t.views[0].frame.visible_count - 1],
                  k = (size_t)t.gradient.anchors.offset_count;
-    decoder_part parts[3];
-    decoder_parts(&t.decoder, parts);
+    decoder_network networks[3];
+    decoder_networks(&t.decoder, networks);
     const struct {
         float *place;
         const char *name;
@@ -452,8 +452,9 @@ static void a_bad_gradient_is_named(void **state)
         {t.gradient.anchors.offset + anchor * 3 * k, "offset", 0, true},
         {t.gradient.anchors.scale_log + anchor * 6 + 5, "scale", 5, true},
         {t.gradient.networks, "opacity network", 0, false},
-        {t.gradient.networks + parts[1].begin + 7, "shape network", 7, false},
-        {t.gradient.networks + parts[2].end - 1, "colour network", parts[2].end - 1 - parts[2].begin, false},
+        {t.gradient.networks + networks[1].begin + 7, "shape network", 7, false},
+        {t.gradient.networks + networks[2].end - 1, "colour network", networks[2].end - 1 - networks[2].begin,
+         false},
     };
     static const float values[] = {NAN, INFINITY, -INFINITY, 1.1e18f, -3e38f};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++)
@@ -546,11 +547,11 @@ static void an_empty_scene_comes_back(void **state)
         step_report r;
         open_ok(&t, tiny, &def);
         t.rules.raises_until = 0;
-        decoder_part parts[3];
-        decoder_parts(&t.decoder, parts);
+        decoder_network networks[3];
+        decoder_networks(&t.decoder, networks);
         step_ok(&t, &r);
         for (int k = 0; k < t.decoder.offset_count; k++)
-            t.decoder.params[parts[0].end - 1 - (size_t)k] = -4;
+            t.decoder.params[networks[0].end - 1 - (size_t)k] = -4;
         for (int i = 0; i < 4; i++) {
             step_ok(&t, &r);
             assert_true(r.gaussians == 0 && r.visible > 0 && t.opacity_raises == 0);
@@ -587,10 +588,10 @@ static void no_offset_dies_at_the_start(void **state)
         t.rules.raises_until = cases[n].until;
         for (int i = 0; i < cases[n].before; i++)
             step_ok(&t, &r);
-        decoder_part parts[3];
-        decoder_parts(&t.decoder, parts);
+        decoder_network networks[3];
+        decoder_networks(&t.decoder, networks);
         const size_t k_count = (size_t)t.decoder.offset_count;
-        t.decoder.params[parts[0].end - k_count] = -2;
+        t.decoder.params[networks[0].end - k_count] = -2;
         size_t count[2] = {0, 0};
         for (int step = 0; step < 2; step++) {
             step_ok(&t, &r);
@@ -610,10 +611,10 @@ static void opacities_are_raised(void **state)
     gbt_train_def def = run_def();
     trainer t;
     open_ok(&t, tiny, &def);
-    decoder_part parts[3];
-    decoder_parts(&t.decoder, parts);
+    decoder_network networks[3];
+    decoder_networks(&t.decoder, networks);
     const size_t k_count = (size_t)t.decoder.offset_count;
-    float *bias = t.decoder.params + parts[0].end - k_count;
+    float *bias = t.decoder.params + networks[0].end - k_count;
     bias[0] = -1;
     bias[1] = 1.5f;
     const gbt_camera camera = photos_camera(&t.photos, 0, 0);

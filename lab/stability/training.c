@@ -15,6 +15,7 @@
 #include "base/vec.h"
 #include "image/metrics.h"
 #include "stability/practice.h"
+#include "train/held_out.h"
 
 static gbt_train_def practice_def(stability *s)
 {
@@ -328,7 +329,7 @@ static double held_out(stability *s, const practice *p, bool exposure)
         stability_ok(s, GBT_ERR_NO_MEMORY);
     else if (s->status == GBT_OK && must(s, practice_open(s, p, &def, t, &why), &why) &&
              must(s, practice_steps(t, &why), &why))
-        must(s, trainer_held_out_psnr(t, &psnr, &why), &why);
+        must(s, held_out_psnr(t, &psnr, &why), &why);
     if (t != NULL)
         trainer_free(t);
     mem_free(t);

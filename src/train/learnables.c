@@ -46,27 +46,27 @@ static double decay(double first, double last, double progress)
     return first == last ? first : exp((1 - progress) * log(first) + progress * log(last));
 }
 
-static double rate_at(const rate_rule *r, double progress, bool own, double extent, double factor, double end)
+static double rate_at(const rate_rule *r, const learning_rates_def *def, double factor)
 {
-    const double scale = own               ? r->own
-                         : r->times_extent ? extent
+    const double scale = def->own          ? r->own
+                         : r->times_extent ? def->extent
                                            : 1,
-                 last = own && r->first == r->last ? end * r->first : r->last;
-    return factor * decay(r->first, last, progress) * scale;
+                 last = def->own && r->first == r->last ? def->end * r->first : r->last;
+    return factor * decay(r->first, last, def->progress) * scale;
 }
 
-learning_rates learning_rates_at(double progress, bool own, double geometry_from, double extent,
-                                 double factor, double end, int views)
+learning_rates learning_rates_at(const learning_rates_def *def)
 {
-    learning_rates rates = {.views = views};
-    if (own && progress > SCHEDULE_COOL_FROM)
-        factor *= cool_end + (1 - cool_end) * fmax(1 - progress, 0) / (1 - SCHEDULE_COOL_FROM);
+    learning_rates rates = {.views = def->views};
+    double factor = def->factor;
+    if (def->own && def->progress > SCHEDULE_COOL_FROM)
+        factor *= cool_end + (1 - cool_end) * fmax(1 - def->progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
-        rates.anchor[f] = rate_at(&anchor_rules[f], progress, own, extent, factor, end);
-    if (progress < geometry_from)
+        rates.anchor[f] = rate_at(&anchor_rules[f], def, factor);
+    if (def->progress < def->geometry_from)
         rates.anchor[ANCHOR_OFFSET] = rates.anchor[ANCHOR_SCALE_LOG] = 0;
     for (int i = 0; i < DECODER_NETWORKS; i++)
-        rates.network[i] = rate_at(&network_rules[i], progress, own, extent, factor, end);
+        rates.network[i] = rate_at(&network_rules[i], def, factor);
     return rates;
 }
 

@@ -31,19 +31,20 @@ typedef struct learning_rates {
     int views; /* of a step: adam_rates_of_views() */
 } learning_rates;
 
-/**
- * Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing
- * (docs/training.md).
- *
- * @param own    [in] true: ours, higher, for runs of some thousand steps; false: the reference method's
- * @param geometry_from [in] offsets and scales have no rate before that progress
- * @param extent [in] of the cameras; the reference's rate of offsets is proportional to it
- * @param factor [in] of all rates
- * @param end    [in] own: schedule_rate_end(), to which rates without an end of their own decay
- * @param views  [in] of a step
- */
-learning_rates learning_rates_at(double progress, bool own, double geometry_from, double extent,
-                                 double factor, double end, int views);
+/** What the rates of a step depend on. */
+typedef struct learning_rates_def {
+    double progress;      /* train_rules_progress() */
+    bool own;             /* ours, higher, for runs of some thousand steps; else the reference method's */
+    double geometry_from; /* offsets and scales have no rate before that progress */
+    double extent;        /* of the cameras; the reference's rate of offsets is proportional to it */
+    double factor;        /* of all rates */
+    double end;           /* own: schedule_rate_end(), to which rates without an end of their own decay */
+    int views;            /* of a step */
+} learning_rates_def;
+
+/** Log-linear decays, and in the end, from SCHEDULE_COOL_FROM on, straight to nearly nothing
+    (docs/training.md). */
+learning_rates learning_rates_at(const learning_rates_def *def);
 
 /** A model in training: the values and what belongs to each. All borrowed. */
 typedef struct learning_model {

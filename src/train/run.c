@@ -18,6 +18,7 @@
 #include "train/budget.h"
 #include "train/checkpoint.h"
 #include "train/config.h"
+#include "train/held_out.h"
 #include "train/old_run.h"
 #include "train/pose_file.h"
 #include "train/resume.h"
@@ -107,7 +108,7 @@ static gbt_status finish_poses(trainer *t, gbt_error *err)
 static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
 {
     double psnr;
-    GBT_TRY(trainer_held_out_psnr(t, &psnr, err));
+    GBT_TRY(held_out_psnr(t, &psnr, err));
     run_log_evaluation(log, t, psnr);
     return GBT_OK;
 }

@@ -88,12 +88,12 @@ double pace_expected(const pace *p, uint64_t step)
     return (double)sum * PACE_SEGMENTS / parts;
 }
 
-float schedule_threshold_factor(double steps)
+float schedule_threshold_factor(double views)
 {
-    return (float)fmin(fmax(sqrt(1000 / fmax(steps, 1)), 0.25), 1);
+    return (float)fmin(fmax(sqrt(1000 / fmax(views, 1)), 0.25), 1);
 }
 
-double schedule_rate_end(double steps) { return fmin(fmax(sqrt(4000 / fmax(steps, 1)), 0.1), 1); }
+double schedule_rate_end(double views) { return fmin(fmax(sqrt(4000 / fmax(views, 1)), 0.1), 1); }
 
 float schedule_left_out(double looks) { return (float)(1 - pow(100 / fmax(looks, 100), 0.3)); }
 

@@ -42,7 +42,7 @@ double pace_progress(const pace *p, uint64_t step);
  */
 double pace_expected(const pace *p, uint64_t step);
 
-/** Where time decides on the pace, what pace_expected() says before is up to twice of what comes. */
+/** Before this progress a run by time expects up to twice its final length. */
 #define SCHEDULE_LENGTH_KNOWN 0.25
 
 /** The part that `step` lies in, or p->known when the known parts are used up. */
@@ -60,17 +60,20 @@ int schedule_level(double progress, int start_level);
 /**
  * How much an anchor must bring, (0, 1]: what growth and pruning ask of it is multiplied by this.
  *
- * A long run has the steps to teach more anchors: 1 up to 1000 steps, then falling with their square root,
+ * A long run has the steps to teach more anchors: 1 up to 1000 views, then falling with their square root,
  * down to 0.25 (docs/training.md).
+ *
+ * @param views that the steps of the whole run look at: pace_expected() times the views of a step
  */
-float schedule_threshold_factor(double steps);
+float schedule_threshold_factor(double views);
 
 /**
  * Where the learning rates that a short run keeps (features, scales) end in a long one, as a part of where
- * they begin: 1 up to 4000 steps, then falling with their square root, down to 0.1. A run that takes ten
- * times the steps is to come ten times as near.
+ * they begin: 1 up to 4000 views, then falling with their square root, down to 0.1.
+ *
+ * @param views as schedule_threshold_factor() has them
  */
-double schedule_rate_end(double steps);
+double schedule_rate_end(double views);
 
 /**
  * The part of the anchors in view that each step until SCHEDULE_EXACT_FROM leaves out at random: 0 up to 100

@@ -11,9 +11,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/stop_signal.h"
 #include "cluster/cluster.h"
-#include "train/align.h"
 #include "train/growing.h"
 #include "train/step_exchange.h"
 #include "train/step_rows.h"
@@ -55,9 +53,10 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
     return GBT_OK;
 }
 
-/* After the render: is the scene empty, and for good? And until anchors grow: is one offset of most anchors?
-   The networks begin at random, and while colours are wrong their opacities fall, all together: what is below
-   0 everywhere hardly ever comes back. What the step's first view saw decides. */
+/* Raise opacities when no Gaussian has been made for EMPTY_STEPS steps; and, until anchors grow, those of an
+   offset whose mean opacity is below 0. The networks begin at random, and while colours are wrong their
+   opacities fall, all together: what is below 0 everywhere hardly ever comes back. The step's first view
+   says what an offset's mean is. */
 static void raise_opacities(trainer *t, const step_report *r, double progress)
 {
     const bool early = progress < t->rules.raises_until;
@@ -191,20 +190,31 @@ static void gather_alone(trainer *t)
                         step_view_near(t, v), v->outcome.parts);
 }
 
+/* How often the whole run looks at each photo, of `all_views` that its steps are expected to look at. Up to
+   SCHEDULE_LENGTH_KNOWN these may be twice too many: half of them count. */
+static double looks_of_run(const trainer *t, double all_views, double progress)
+{
+    const bool by_time = t->def.iterations == 0 || t->def.pace != NULL;
+    return all_views / t->photo_steps * (by_time && progress < SCHEDULE_LENGTH_KNOWN ? 0.5 : 1);
+}
+
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
     stage_clock start = stage_begin();
     memset(out, 0, sizeof *out);
     const double progress = pace_progress(&t->pace, t->step), next = pace_progress(&t->pace, t->step + 1),
-                 views = t->def.views, steps = views * pace_expected(&t->pace, t->step);
+                 views = t->def.views, all_views = views * pace_expected(&t->pace, t->step);
     const bool learns = t->rules.last_step_learns || next < 1,
-               by_time = t->def.iterations == 0 || t->def.pace != NULL;
-    const double looks = steps / t->photo_steps * (by_time && progress < SCHEDULE_LENGTH_KNOWN ? 0.5 : 1);
+               leaves_out = t->rules.leaves_out && train_rules_are_loose(&t->rules, progress);
     const learning_rates rates = learning_rates_at(
-        train_rules_progress(&t->rules, &t->pace, t->step), t->rules.own_rates, t->rules.geometry_from,
-        t->extent, t->def.learning_rate_factor * sqrt(views), schedule_rate_end(steps), t->def.views);
-    t->left_out =
-        t->rules.leaves_out && train_rules_are_loose(&t->rules, progress) ? schedule_left_out(looks) : 0;
+        &(learning_rates_def){.progress = train_rules_progress(&t->rules, &t->pace, t->step),
+                              .own = t->rules.own_rates,
+                              .geometry_from = t->rules.geometry_from,
+                              .extent = t->extent,
+                              .factor = t->def.learning_rate_factor * sqrt(views),
+                              .end = schedule_rate_end(all_views),
+                              .views = t->def.views});
+    t->left_out = leaves_out ? schedule_left_out(looks_of_run(t, all_views, progress)) : 0;
 
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));
@@ -244,46 +254,6 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     t->step++;
     out->all = stage_lap(&start);
     return GBT_OK;
-}
-
-gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err)
-{
-    gbt_status status = t->poses.count > 0 ? align_held_out(t, err) : GBT_OK;
-    double sum = 0;
-    size_t count = 0;
-    image photo = {0};
-    for (size_t i = 0; i < t->scene.view_count && status == GBT_OK; i++) {
-        if (!t->scene.views[i].is_test)
-            continue;
-        if (stop_signal_seen()) {
-            status = base_fail(err, GBT_ERR_INTERRUPTED, "stopped while held-out photos were scored");
-            break;
-        }
-        unsigned char *marks = NULL;
-        const unsigned char *valid = NULL;
-        const gbt_camera camera = photos_camera(&t->photos, i, 0);
-        status = step_view_draw(t, &t->views[0], i, &camera, false, err);
-        if (status == GBT_OK)
-            status =
-                scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &marks, err);
-        if (status == GBT_OK)
-            status = frame_valid(&t->views[0].frame, marks, &valid, err);
-        image_scores scores = {0};
-        if (status == GBT_OK)
-            status = image_score_photo(&t->views[0].frame.rgb, &photo, valid, t->exposures.count > 0, NULL,
-                                       &scores, err);
-        if (status == GBT_OK && isfinite(scores.psnr)) { /* else every pixel is masked */
-            sum += scores.psnr;
-            count++;
-        }
-        image_free(&photo);
-        mem_free(marks);
-    }
-    for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* files are to have no other */
-        if (t->scene.views[i].is_test)
-            t->scene.views[i].camera = t->poses.given[i];
-    *psnr = count > 0 ? sum / (double)count : (double)NAN;
-    return status;
 }
 
 void trainer_free(trainer *t)

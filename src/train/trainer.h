@@ -109,15 +109,6 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
  */
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err);
 
-/**
- * Mean PSNR over the held-out views at full training resolution, on 8-bit images; of their right halves with
- * --exposure (affine_split()); from poses that fit them with --refine-poses (align_held_out()), which are
- * forgotten.
- *
- * @return also GBT_ERR_INTERRUPTED at a signal (base/stop_signal.h)
- */
-gbt_status trainer_held_out_psnr(trainer *t, double *psnr, gbt_error *err);
-
 void trainer_free(trainer *t);
 
 #endif

@@ -8,6 +8,7 @@
 #include "folder.h"
 
 #include "gbtrace/make_scene.h"
+#include "train/held_out.h"
 #include "train/trainer.h"
 
 enum { PATH_SIZE = 512, STEPS = 60, VIEWS = 9 };

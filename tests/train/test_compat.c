@@ -116,8 +116,14 @@ static void rates_count_from_one(void **state)
     trainer t = long_run(true);
     for (size_t i = 0; i < sizeof wanted / sizeof *wanted; i++) {
         t.step = wanted[i].step - 1;
-        const learning_rates r = learning_rates_at(train_rules_progress(&t.rules, &t.pace, t.step),
-                                                   t.rules.own_rates, t.rules.geometry_from, 2, 1, 1, 1);
+        const learning_rates r = learning_rates_at(
+            &(learning_rates_def){.progress = train_rules_progress(&t.rules, &t.pace, t.step),
+                                  .own = t.rules.own_rates,
+                                  .geometry_from = t.rules.geometry_from,
+                                  .extent = 2,
+                                  .factor = 1,
+                                  .end = 1,
+                                  .views = 1});
         assert_true(fabs(r.network[DECODER_COLOR] / wanted[i].color - 1) < 1e-6);
         assert_true(fabs(r.network[DECODER_OPACITY] / wanted[i].opacity - 1) < 1e-6);
         assert_true(fabs(r.anchor[ANCHOR_OFFSET] / (2 * wanted[i].offset) - 1) < 1e-6);

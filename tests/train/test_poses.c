@@ -173,7 +173,7 @@ static void scoring_leaves_no_pose_behind(void **state)
     open_ok(&t, tiny, &def);
     for (int i = 0; i < STEPS / 2; i++)
         step_ok(&t, &report);
-    assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+    assert_ok(held_out_psnr(&t, &psnr, NULL));
     assert_true(isfinite(psnr) && t.test_count > 0);
     for (size_t i = 0; i < t.scene.view_count; i++)
         assert_true(t.scene.views[i].is_test ==

@@ -876,7 +876,7 @@ static double score_of(const char *run, const char *data, gbt_train_def def)
     double in_passing;
     open_ok(&t, data, &def);
     assert_ok(checkpoint_load(&t, joined(run, "checkpoints/last.gbt"), NULL));
-    assert_ok(trainer_held_out_psnr(&t, &in_passing, NULL));
+    assert_ok(held_out_psnr(&t, &in_passing, NULL));
     if (!(fabs(in_passing - psnr) < 0.01))
         fail_msg("%.9f dB in passing, %.9f dB by eval", in_passing, psnr);
     trainer_free(&t);
@@ -1077,11 +1077,11 @@ static void scoring_in_passing_stops_at_a_signal(void **state)
     open_ok(&t, tiny, &def);
     stop_signal_catch();
     raise(SIGTERM);
-    const gbt_status status = trainer_held_out_psnr(&t, &psnr, &err);
+    const gbt_status status = held_out_psnr(&t, &psnr, &err);
     stop_signal_release();
     assert_int_equal(status, GBT_ERR_INTERRUPTED);
     assert_string_equal(err.text, "stopped while held-out photos were scored");
-    assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+    assert_ok(held_out_psnr(&t, &psnr, NULL));
     assert_true(isfinite(psnr));
     trainer_free(&t);
 }

@@ -44,7 +44,7 @@ static double trained(const char *data, bool still)
     step_report report;
     for (int i = 0; i < ROLLING_STEPS; i++)
         step_ok(&t, &report);
-    assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+    assert_ok(held_out_psnr(&t, &psnr, NULL));
     trainer_free(&t);
     return psnr;
 }

@@ -526,7 +526,7 @@ static void training_learns(void **state)
     memset(t.settings.background, 0, sizeof t.settings.background); /* in front of black all that is right has
                                                                        been learnt */
     double before, after, again, first_loss = 0, last_loss = 0;
-    assert_ok(trainer_held_out_psnr(&t, &before, NULL));
+    assert_ok(held_out_psnr(&t, &before, NULL));
     bool changed = false;
     for (int i = 0; i < 160; i++) {
         const size_t count = t.anchors.count;
@@ -540,9 +540,9 @@ static void training_learns(void **state)
         first_loss += i < 8 ? r.loss / 8 : 0;
         last_loss += i >= 152 ? r.loss / 8 : 0;
     }
-    assert_ok(trainer_held_out_psnr(&t, &after, NULL));
+    assert_ok(held_out_psnr(&t, &after, NULL));
     t.views[0].frame.draw.chance.share = 0.5f; /* as steps of long runs leave it */
-    assert_ok(trainer_held_out_psnr(&t, &again, NULL));
+    assert_ok(held_out_psnr(&t, &again, NULL));
     assert_true(again == after);
     print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after,
                   first_loss, last_loss, t.anchors_initial, t.anchors.count);
@@ -695,8 +695,13 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.scale_log, t.anchors.scale_log, n * 6 * sizeof(float));
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
-        learning_rates_at(pace_progress(&t.pace, t.step), true, t.rules.geometry_from, t.extent,
-                          t.def.learning_rate_factor, 1, 1);
+        learning_rates_at(&(learning_rates_def){.progress = pace_progress(&t.pace, t.step),
+                                                .own = true,
+                                                .geometry_from = t.rules.geometry_from,
+                                                .extent = t.extent,
+                                                .factor = t.def.learning_rate_factor,
+                                                .end = 1,
+                                                .views = 1});
     step_ok(&t, &r);
     assert_int_equal(t.anchors.count, n); /* no round: rows are where they were */
     double offset = 0, scale = 0, feature = 0;
@@ -1036,7 +1041,7 @@ static void validation_needs_no_held_out_photo(void **state)
         assert_int_equal(t.test_count, (others - (size_t)fold + 3) / 4);
         assert_int_equal(t.train_count, others - t.test_count);
         step_ok(&t, &r);
-        assert_ok(trainer_held_out_psnr(&t, &psnr, NULL));
+        assert_ok(held_out_psnr(&t, &psnr, NULL));
         assert_true(isfinite(psnr));
         trainer_free(&t);
     }
@@ -1369,6 +1374,17 @@ static void pace_is_read(void **state)
     trainer_free(&t);
 }
 
+static learning_rates rates_at(double progress, bool own, double geometry_from, double extent, double end)
+{
+    return learning_rates_at(&(learning_rates_def){.progress = progress,
+                                                   .own = own,
+                                                   .geometry_from = geometry_from,
+                                                   .extent = extent,
+                                                   .factor = 1,
+                                                   .end = end,
+                                                   .views = 1});
+}
+
 static void levels_and_rates(void **state)
 {
     (void)state;
@@ -1390,7 +1406,7 @@ static void levels_and_rates(void **state)
     double before[6];
     for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = learning_rates_at(i / 100.0, own, 0, 2.0, 1, 1, 1);
+            const learning_rates r = rates_at(i / 100.0, own, 0, 2.0, 1);
             const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
                                    r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
                                    r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
@@ -1400,31 +1416,30 @@ static void levels_and_rates(void **state)
                 before[k] = now[k];
             }
         }
-    assert_true(learning_rates_at(1, true, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] <
-                0.05 * learning_rates_at(0.9, true, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
-    assert_true(learning_rates_at(1, false, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE] ==
-                learning_rates_at(0.9, false, 0, 1, 1, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(rates_at(1, true, 0, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * rates_at(0.9, true, 0, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(rates_at(1, false, 0, 1, 1).anchor[ANCHOR_FEATURE] ==
+                rates_at(0.9, false, 0, 1, 1).anchor[ANCHOR_FEATURE]);
     assert_true(schedule_rate_end(1) == 1 && schedule_rate_end(4000) == 1 &&
                 schedule_rate_end(16000) == 0.5 && schedule_rate_end(1e9) == 0.1);
     assert_true(schedule_left_out(0) == 0 && schedule_left_out(100) == 0 &&
                 fabsf(schedule_left_out(300) - 0.2808f) < 1e-4f &&
                 fabsf(schedule_left_out(1000) - 0.4988f) < 1e-4f && schedule_left_out(1e9) < 1);
-    const learning_rates waits = learning_rates_at(0.0499, true, 0.05, 1, 1, 1, 1),
-                         learns = learning_rates_at(0.05, true, 0.05, 1, 1, 1, 1);
+    const learning_rates waits = rates_at(0.0499, true, 0.05, 1, 1),
+                         learns = rates_at(0.05, true, 0.05, 1, 1);
     assert_true(waits.anchor[ANCHOR_OFFSET] == 0 && waits.anchor[ANCHOR_SCALE_LOG] == 0 &&
                 waits.anchor[ANCHOR_FEATURE] > 0 && waits.network[DECODER_SHAPE] > 0);
     assert_true(learns.anchor[ANCHOR_OFFSET] > 0 && learns.anchor[ANCHOR_SCALE_LOG] > 0);
-    const learning_rates at_last = learning_rates_at(0.9, true, 0, 1, 1, 0.1, 1),
-                         flat = learning_rates_at(0.9, true, 0, 1, 1, 1, 1);
+    const learning_rates at_last = rates_at(0.9, true, 0, 1, 0.1), flat = rates_at(0.9, true, 0, 1, 1);
     assert_true(at_last.anchor[ANCHOR_SCALE_LOG] < 0.13 * flat.anchor[ANCHOR_SCALE_LOG] &&
                 at_last.anchor[ANCHOR_OFFSET] == flat.anchor[ANCHOR_OFFSET]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = learning_rates_at(i / 100.0, false, 0, 2.0, 1, 1, 1);
-        assert_true(fabs(r.anchor[ANCHOR_OFFSET] /
-                             learning_rates_at(i / 100.0, false, 0, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET] -
-                         2) < 1e-12);
-        assert_true(learning_rates_at(i / 100.0, true, 0, 2.0, 1, 1, 1).anchor[ANCHOR_OFFSET] ==
-                    learning_rates_at(i / 100.0, true, 0, 1.0, 1, 1, 1).anchor[ANCHOR_OFFSET]);
+        const learning_rates r = rates_at(i / 100.0, false, 0, 2.0, 1);
+        assert_true(
+            fabs(r.anchor[ANCHOR_OFFSET] / rates_at(i / 100.0, false, 0, 1.0, 1).anchor[ANCHOR_OFFSET] - 2) <
+            1e-12);
+        assert_true(rates_at(i / 100.0, true, 0, 2.0, 1).anchor[ANCHOR_OFFSET] ==
+                    rates_at(i / 100.0, true, 0, 1.0, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 

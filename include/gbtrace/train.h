@@ -169,7 +169,7 @@ typedef struct gbt_train_setting {
     const char *choices; /* GBT_SETTING_CHOICE: "a|b|c", in the order of the enum. GBT_SETTING_TEXT: some of
                             the values */
     const char *unit;    /* what stands for a value in a list: "N", "TIME"; NULL for flags and choices */
-    const char *help;    /* one line */
+    const char *help;    /* one line; of a flag whose default is true: what false does */
     const char *aliases; /* names that other programs have, with blanks between; NULL: none */
     bool saved;          /* in RUN/config: it decides the result */
     bool if_changed; /* in RUN/config only where it is not the default: a run without it has the bytes that it

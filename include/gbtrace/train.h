@@ -31,7 +31,7 @@ typedef struct gbt_train_def {
                               iterations is 0. 0: 600, or with `resume` as long as the run was to be */
     int views;             /* photos that a step looks at, a power of two up to 64; results depend on it */
     const char *pace;      /* "n1,...,n20", or the list in train.json: iterations in each twentieth of the
-                              schedule,      as a budget run records them; NULL: as the budget allows */
+                              schedule, as a budget run records them; NULL: as the budget allows */
     double downscale; /* of the cameras' width and height; 0: to the size of the photos if they are smaller,
                          then to 1,600 pixels if the median photo is wider, but for compat */
     gbt_renderer renderer; /* what the photos are compared with; one that trains */

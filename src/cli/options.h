@@ -39,7 +39,7 @@ typedef struct option {
     const char *value_name; /* for help and messages: "N", "FILE"; NULL for flags and choices */
     const char *help;
     const char *field;   /* what the library calls it, in its errors and in configurations, where that is
-                            another   name; of OPTION_FLAG_OFF what it turns off */
+                            another name; of OPTION_FLAG_OFF what it turns off */
     const char *aliases; /* more names with blanks between, as other programs call it; one letter goes with
                             one dash */
     const char *fixed;   /* OPTION_STRING, OPTION_CHOICE: takes no value, and sets this one */

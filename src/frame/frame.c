@@ -41,7 +41,8 @@ static float pixel_variance(const frame *f, float variance)
     return variance / (step * step);
 }
 
-/* By which splats are dilated, in pixels of the camera: what is as wide as the pixels already need not be. */
+/* Variance by which splats are dilated, camera pixels^2; 0 with other renderers, and when Gaussians were
+   widened already. */
 static float dilation_of(const frame *f)
 {
     return f->draw.renderer == GBT_RENDERER_RASTER && !f->widened

@@ -23,6 +23,7 @@
 #include "gb/split.h"
 
 enum {
+    BALL_DEPTH_MAX = 64,
     SUBTREES = 64,         /* the top is grown until there are this many sets to share out ... */
     SUBTREE_POINTS = 4096, /* ... or no set is larger than this */
     KEPT_SPACINGS = 4 /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is

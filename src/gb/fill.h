@@ -6,15 +6,13 @@
 #include "gb/balls.h"
 #include "gb/moments.h"
 
-enum { BALL_DEPTH_MAX = 64 };
-
 /**
  * Fill *out from points in the order of the balls.
  *
  * Statistics are summed in index order: they depend on the set alone, not on the way to it.
  *
  * @param points       [in] [count], those of a ball together; sorted by index inside a ball on return
- * @param leaf_depth   [in] [count]: 1 + depth where a ball begins, else 0
+ * @param leaf_depth   [in] [count]: 1 + depth, 1 to 255, where a ball begins, else 0
  * @param color        [in] [..][3], indexed by the points' index, or NULL
  * @param radius_floor [in] s_min, eq 21
  * @param out          [out] free with balls_free(); also after GBT_ERR_NO_MEMORY

@@ -7,7 +7,7 @@
 enum { PICK_ROWS = 32 /* of one thread at a time */ };
 
 typedef struct pick_job {
-    const unsigned char *bytes, *through;
+    const unsigned char *bytes, *transparency;
     const float *change;
     size_t first, row, step; /* pixels */
     image *out;
@@ -18,11 +18,11 @@ static size_t first_of(const photo_pick *pick, int full_width)
     return (size_t)pick->first[1] * (size_t)full_width + (size_t)pick->first[0];
 }
 
-static void lay_on(const pick_job *job, const unsigned char *through, float *to)
+static void lay_on(const pick_job *job, const unsigned char *transparency, float *to)
 {
     for (size_t x = 0; x < (size_t)job->out->width; x++)
         for (size_t c = 0; c < 3; c++)
-            to[3 * x + c] += (float)through[x * job->step] * (1.0f / 255) * job->change[c];
+            to[3 * x + c] += (float)transparency[x * job->step] * (1.0f / 255) * job->change[c];
 }
 
 static void pick_rows(size_t block, size_t begin, size_t end, void *context)
@@ -42,16 +42,16 @@ static void pick_rows(size_t block, size_t begin, size_t end, void *context)
                 for (size_t c = 0; c < 3; c++)
                     to[3 * x + c] = (float)from[x * stride + c] * (1.0f / 255);
         }
-        if (job->through != NULL)
-            lay_on(job, job->through + first, to);
+        if (job->transparency != NULL)
+            lay_on(job, job->transparency + first, to);
     }
 }
 
 void photo_pick_pixels(const unsigned char *bytes, int full_width, const photo_pick *pick,
-                       const unsigned char *through, const float *change, image *out)
+                       const unsigned char *transparency, const float *change, image *out)
 {
     pick_job job = {.bytes = bytes,
-                    .through = through,
+                    .transparency = transparency,
                     .change = change,
                     .first = first_of(pick, full_width),
                     .row = (size_t)full_width,

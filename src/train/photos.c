@@ -96,15 +96,15 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     *p = (photos){.source = source,
                   .downscale = downscale > 0 ? downscale : 1,
                   .bytes_max = kept_bytes(),
-                  .passing = SIZE_MAX,
-                  .level_passing = SIZE_MAX};
+                  .kept_until_next = SIZE_MAX,
+                  .level_kept_until_next = SIZE_MAX};
     p->full = mem_calloc(source->view_count, sizeof *p->full, "photo cache", err);
     p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
     p->valid = mem_calloc(source->view_count, sizeof *p->valid, "photo cache", err);
-    p->through = mem_calloc(source->view_count, sizeof *p->through, "photo cache", err);
+    p->transparency = mem_calloc(source->view_count, sizeof *p->transparency, "photo cache", err);
     return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL ||
-                   p->through == NULL
+                   p->transparency == NULL
                ? GBT_ERR_NO_MEMORY
                : GBT_OK;
 }
@@ -119,7 +119,7 @@ static void drop_all(unsigned char **pixels, size_t count)
 
 void photos_close(photos *p)
 {
-    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid, p->through};
+    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid, p->transparency};
     for (int i = 0; i < 5; i++) {
         drop_all(caches[i], p->source->view_count);
         mem_free(caches[i]);
@@ -172,33 +172,33 @@ static size_t full_bytes(const photos *p, size_t view)
 
 static void drop_full(photos *p, size_t view)
 {
-    unsigned char **const caches[] = {p->full, p->full_valid, p->through};
+    unsigned char **const caches[] = {p->full, p->full_valid, p->transparency};
     for (int i = 0; i < 3; i++) {
         mem_free(caches[i][view]);
         caches[i][view] = NULL;
     }
 }
 
-static void drop_passing(photos *p)
+static void drop_kept_until_next(photos *p)
 {
-    if (p->passing == SIZE_MAX)
+    if (p->kept_until_next == SIZE_MAX)
         return;
-    drop_full(p, p->passing);
-    p->passing = SIZE_MAX;
+    drop_full(p, p->kept_until_next);
+    p->kept_until_next = SIZE_MAX;
 }
 
 /* Into p->full, and what goes with it. */
 static gbt_status read_into(photos *p, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
-    image photo, through;
+    image photo, transparency;
     GBT_TRY(scene_read_photo_through(&p->source->views[view], camera.width, camera.height, &photo,
-                                     &p->full_valid[view], &through, err));
+                                     &p->full_valid[view], &transparency, err));
     gbt_status status = to_bytes(&photo, &p->full[view], err);
-    if (status == GBT_OK && through.pixels != NULL)
-        status = to_bytes(&through, &p->through[view], err);
+    if (status == GBT_OK && transparency.pixels != NULL)
+        status = to_bytes(&transparency, &p->transparency[view], err);
     image_free(&photo);
-    image_free(&through);
+    image_free(&transparency);
     if (status != GBT_OK)
         drop_full(p, view);
     return status;
@@ -213,12 +213,12 @@ gbt_status photos_read_full(photos *p, size_t view, gbt_error *err)
     const size_t more = full_bytes(p, view);
     const bool stays = p->bytes + more <= p->bytes_max;
     if (!stays)
-        drop_passing(p);
+        drop_kept_until_next(p);
     GBT_TRY(read_into(p, view, err));
     if (stays)
         p->bytes += more;
     else
-        p->passing = view;
+        p->kept_until_next = view;
     return GBT_OK;
 }
 
@@ -342,16 +342,16 @@ const unsigned char *photos_valid(const photos *p, size_t view)
     return p->level == 0 ? p->full_valid[view] : p->valid[view];
 }
 
-static void drop_level_passing(photos *p)
+static void drop_level_kept_until_next(photos *p)
 {
-    if (p->level_passing == SIZE_MAX)
+    if (p->level_kept_until_next == SIZE_MAX)
         return;
     unsigned char **const caches[] = {p->pixels, p->valid};
     for (int i = 0; i < 2; i++) {
-        mem_free(caches[i][p->level_passing]);
-        caches[i][p->level_passing] = NULL;
+        mem_free(caches[i][p->level_kept_until_next]);
+        caches[i][p->level_kept_until_next] = NULL;
     }
-    p->level_passing = SIZE_MAX;
+    p->level_kept_until_next = SIZE_MAX;
 }
 
 /* What was made for `level` stays if there is room, else until the next is made. */
@@ -359,7 +359,7 @@ static void count_level(photos *p, size_t view)
 {
     const size_t more = (size_t)(3 + (p->valid[view] != NULL)) * pixel_count(p, view, p->level);
     if (p->bytes + more > p->bytes_max) {
-        p->level_passing = view;
+        p->level_kept_until_next = view;
         return;
     }
     p->bytes += more;
@@ -374,14 +374,14 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *
         p->level = level;
         p->bytes -= p->level_bytes;
         p->level_bytes = 0;
-        p->level_passing = SIZE_MAX;
+        p->level_kept_until_next = SIZE_MAX;
     }
     if (level == 0)
         return get_full(p, view, out, err);
     const gbt_camera camera = photos_camera(p, view, level);
     if (p->pixels[view] == NULL) {
         image full = {0}, small = {0};
-        drop_level_passing(p);
+        drop_level_kept_until_next(p);
         gbt_status status = get_full(p, view, &full, err);
         if (status == GBT_OK)
             status = photo_resize(&full, camera.width, camera.height, &small, err);

@@ -15,19 +15,19 @@ typedef struct photos {
     size_t bytes_max; /* of photos that are kept, at level 0 and `level`; the others are made whenever they
                          are asked for */
     size_t bytes;     /* of those that are */
-    size_t passing;   /* a view whose photo stays until the next that finds no room; SIZE_MAX: none */
+    size_t kept_until_next; /* a view whose photo stays until the next that finds no room; SIZE_MAX: none */
     int level;
-    size_t level_bytes;   /* of `bytes`, at `level` > 0 */
-    size_t level_passing; /* as `passing`, at `level` > 0 */
+    size_t level_bytes;           /* of `bytes`, at `level` > 0 */
+    size_t level_kept_until_next; /* as `kept_until_next`, at `level` > 0 */
     size_t decoded_max;   /* bytes that photos take while they are decoded at once; 0: a quarter of the memory
                              that is free */
     unsigned char **full; /* [view_count] at level 0, NULL until asked for */
     unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
     unsigned char **full_valid,
         **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
-    unsigned char **through; /* [view_count] how transparent each pixel at level 0 is, 255: wholly; NULL for a
-                                photo that is opaque, or whose alpha channel is a mask */
-    unsigned char *sample_valid; /* of the last photos_get_sample(), when it picked pixels */
+    unsigned char **transparency; /* [view_count] how transparent each pixel at level 0 is, 255: wholly; NULL
+                                     for a photo that is opaque, or whose alpha channel is a mask */
+    unsigned char *sample_valid;  /* of the last photos_get_sample(), when it picked pixels */
     size_t sample_valid_capacity;
 } photos;
 

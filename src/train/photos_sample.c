@@ -58,8 +58,8 @@ static void pick_pixels(const photos *p, size_t view, int full_width, const phot
     float change[3] = {0, 0, 0};
     for (int c = 0; c < 3 && backdrop != NULL; c++)
         change[c] = backdrop[c] - behind;
-    photo_pick_pixels(p->full[view], full_width, from, backdrop != NULL ? p->through[view] : NULL, change,
-                      out);
+    photo_pick_pixels(p->full[view], full_width, from, backdrop != NULL ? p->transparency[view] : NULL,
+                      change, out);
 }
 
 /* A whole photo at a level, on a colour of its own: made anew each time. */
@@ -68,7 +68,7 @@ static gbt_status get_laid_on(photos *p, size_t view, int level, const float *ba
 {
     const gbt_camera full = photos_camera(p, view, 0), camera = photos_camera(p, view, level);
     GBT_TRY(photos_read_full(p, view, err));
-    if (p->through[view] == NULL)
+    if (p->transparency[view] == NULL)
         return GBT_OK;
     image whole = {0};
     GBT_TRY(image_fit(&whole, full.width, full.height, 3, err));

@@ -87,7 +87,7 @@ static void photos_without_room_count(void **state)
     size_t kept = 0;
     for (size_t v = 0; v < t.scene.view_count; v++)
         kept += t.photos.full[v] != NULL;
-    assert_int_equal(kept, 3); /* the last one is passing */
+    assert_int_equal(kept, 3); /* the last one stays until the next */
     assert_true(few.large && few.stops == all.stops);
     trainer_free(&t);
 }

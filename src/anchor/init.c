@@ -167,7 +167,8 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
         return GBT_ERR_NO_MEMORY;
     size_t chosen = 0;
     for (size_t i = 0; i < count && chosen < wanted; i++)
-        if ((double)rng_uniform(seed, 0, i) * (double)(count - i) < (double)(wanted - chosen))
+        if ((double)rng_uniform(seed, RNG_STREAM_RANDOM_ANCHORS, i) * (double)(count - i) <
+            (double)(wanted - chosen))
             memcpy(*out + 3 * chosen++, position + 3 * i, 3 * sizeof **out);
     return GBT_OK;
 }

@@ -12,7 +12,7 @@
 
 enum { CHOOSE_BLOCK = 4096 /* Gaussians */ };
 
-/* Not lost to the random drop. */
+/* Not lost to the random drop. rng.h says which other streams these are. */
 static bool is_drawn(const growth_def *def, int level, uint64_t slot)
 {
     return rng_uniform(def->seed, def->step * GROWTH_MAX_LEVELS + (uint64_t)level, slot) >

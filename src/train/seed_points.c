@@ -26,8 +26,7 @@ enum {
     DEPTHS = 96,
     PATCH = 5, /* pixels, odd */
     PATCH_AREA = PATCH * PATCH,
-    BLOCK = 64,
-    STREAM_SEEDS = 3
+    BLOCK = 64
 };
 
 /* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not
@@ -276,7 +275,7 @@ static void seed_block(size_t block, size_t begin, size_t end, void *context)
         c->index = (uint32_t)i;
         c->doubt = INFINITY;
         uint32_t words[4];
-        rng_philox(s->seed, STREAM_SEEDS, i, words);
+        rng_philox(s->seed, RNG_STREAM_SEED_POINTS, i, words);
         const seed_view *v = &s->views[((uint64_t)words[0] * s->view_count) >> 32];
         const size_t x = (size_t)(((uint64_t)words[1] * (uint64_t)v->photo.width) >> 32),
                      y = (size_t)(((uint64_t)words[2] * (uint64_t)v->photo.height) >> 32);

@@ -19,7 +19,7 @@
 #include "train/setup_data.h"
 #include "train/trainer.h"
 
-enum { STREAM_NETWORKS = 2, DISTANCE_VIEWS = 4096 };
+enum { DISTANCE_VIEWS = 4096 };
 
 /* Distances from training cameras, where there are very many a part of them, to a sample of the anchors: they
    decide whether the networks see the distance, its unit, and t_near. */
@@ -168,7 +168,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
         def->distance == GBT_DISTANCE_INPUT_ON ||
         (def->distance == GBT_DISTANCE_INPUT_AUTO && wide && t->rules.distance_where_wide);
     uint32_t words[4];
-    rng_philox(def->seed, STREAM_NETWORKS, 0, words);
+    rng_philox(def->seed, RNG_STREAM_NETWORKS, 0, words);
     GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
     t->distance = (double)median;
     t->decoder.distance_scale = t->rules.distance_by_median ? 1 / median : 1.0f;

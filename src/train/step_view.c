@@ -19,8 +19,6 @@
 #include "train/step_rows.h"
 #include "train/trainer.h"
 
-enum { STREAM_VIEWS = 1, STREAM_PIXELS = 4, STREAM_PARTS = 6, STREAM_BACKGROUND = 8, STREAM_LEFT_OUT = 10 };
-
 /* ---- which photo ---- */
 
 /* How many views come before view `index` of the next step. */
@@ -39,7 +37,7 @@ static size_t pick_photo(trainer *t, uint64_t before)
             t->order[i] = (uint32_t)i;
         for (size_t i = t->train_count; i > 1; i--) { /* Durstenfeld 1964 */
             uint32_t words[4];
-            rng_philox(t->def.seed, STREAM_VIEWS, epoch << 32 | i, words);
+            rng_philox(t->def.seed, RNG_STREAM_PHOTO_ORDER, epoch << 32 | i, words);
             const size_t j = (size_t)(((uint64_t)words[0] * i) >> 32);
             const uint32_t swap = t->order[i - 1];
             t->order[i - 1] = t->order[j];
@@ -71,12 +69,12 @@ static int random_phase(uint32_t word, int level)
 static photo_sample pick_pixels(const trainer *t, step_pixels size, size_t slot, uint64_t before)
 {
     uint32_t words[4];
-    rng_philox(t->def.seed, STREAM_PIXELS, before, words);
+    rng_philox(t->def.seed, RNG_STREAM_PIXELS, before, words);
     if (size.level > 0)
         return (photo_sample){
             .level = size.level,
             .phase = {random_phase(words[0], size.level), random_phase(words[1], size.level)}};
-    rng_philox(t->def.seed, STREAM_PARTS, slot, words);
+    rng_philox(t->def.seed, RNG_STREAM_PARTS, slot, words);
     const uint64_t parts = (uint64_t)size.parts,
                    turn = (words[0] + before / t->train_count) % (parts * parts);
     return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
@@ -90,7 +88,7 @@ static bool pick_background(const trainer *t, uint64_t before, float out[3])
     memcpy(out, t->settings.background, sizeof t->settings.background);
     if (pace_progress(&t->pace, t->step) < t->rules.opaque_from)
         return false;
-    rng_philox(t->def.seed, STREAM_BACKGROUND, before, words);
+    rng_philox(t->def.seed, RNG_STREAM_BACKGROUND, before, words);
     if (words[3] >> 31 != 0) /* at random: photos come in turn */
         return false;
     for (int c = 0; c < 3; c++)
@@ -115,7 +113,7 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     const size_t view = t->train_views[v->slot];
     const step_pixels size = size_of_step(t, view);
     v->frame.draw.chance = (visible_chance){
-        .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)STREAM_LEFT_OUT << 48 | before};
+        .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)RNG_STREAM_LEFT_OUT << 48 | before};
     v->outcome.level = size.level;
     v->outcome.parts = size.parts;
     photo_sample sample = pick_pixels(t, size, v->slot, before);

@@ -263,10 +263,17 @@ static gbt_status count_voxels(const scene *s, float voxel_size, size_t *out, gb
     return status;
 }
 
+/* What is made of the anchors. */
+typedef struct init_outputs {
+    const char *ply;
+    bool mesh;        /* of the PLY: triangles, not points */
+    const char *json; /* NULL: none */
+    FILE *report;
+} init_outputs;
+
 /** Everything after the anchors are made. */
-static gbt_status report_anchors(const char *data, const gbt_init_def *def, const char *out_ply,
-                                 const char *json_path, FILE *report, const scene *s, const anchors *a,
-                                 const balls *b, init_facts *facts, gbt_error *err)
+static gbt_status report_anchors(const char *data, const scene *s, const anchors *a, const balls *b,
+                                 init_facts *facts, const init_outputs *out, gbt_error *err)
 {
     anchor_rows rows = {0};
     float *scratch = NULL;
@@ -281,7 +288,7 @@ static gbt_status report_anchors(const char *data, const gbt_init_def *def, cons
         goto done;
     for (size_t i = 0; i < a->count * ANCHOR_SCALES; i++)
         rows.scale[i] = expf(a->scale_log[i]);
-    status = def->mesh ? write_mesh(out_ply, s, a, &rows, err) : write_points(out_ply, s, a, &rows, err);
+    status = out->mesh ? write_mesh(out->ply, s, a, &rows, err) : write_points(out->ply, s, a, &rows, err);
     if (status != GBT_OK)
         goto done;
     scratch = mem_alloc(a->count, sizeof *scratch, "anchor rows", err);
@@ -293,10 +300,10 @@ static gbt_status report_anchors(const char *data, const gbt_init_def *def, cons
     facts->scale = spread_of(rows.scale, ANCHOR_SCALES, a->count, scratch);
     facts->count = spread_of(rows.count, 1, a->count, scratch);
     facts->depth = spread_of(rows.depth, 1, a->count, scratch);
-    if (json_path != NULL)
-        status = save_json(json_path, data, facts, err);
+    if (out->json != NULL)
+        status = save_json(out->json, data, facts, err);
     if (status == GBT_OK)
-        print_facts(report, facts);
+        print_facts(out->report, facts);
 done:
     mem_free(scratch);
     rows_free(&rows);
@@ -359,8 +366,9 @@ gbt_status gbt_init(const char *data, const gbt_init_def *def, const char *out_p
         status = init_quality_measure(points, facts.voxel_size, def->max_depth, def->init_count,
                                       facts.quality, err);
     }
+    const init_outputs out = {.ply = out_ply, .mesh = def->mesh, .json = json_path, .report = report};
     if (status == GBT_OK)
-        status = report_anchors(data, def, out_ply, json_path, report, &s, &a, &b, &facts, err);
+        status = report_anchors(data, &s, &a, &b, &facts, &out, err);
     balls_free(&b);
     anchors_free(&a);
     scene_free(&s);

@@ -18,8 +18,8 @@ typedef struct growth_points {
     const float *position;  /* [count][3], finite */
     const uint32_t *anchor; /* [count]: row of the anchor that speaks for the point, the nearest */
     bool as_start;      /* true: the threshold is that of the first level, Gaussians count however few views
-                           saw them, and a new anchor has the size `scale`. false: threshold and size are those
-                           of the last level, and Gaussians count that enough views saw */
+                           saw them, a new anchor has the size `scale`; false: threshold and size are those of
+                           the last level, and Gaussians count that enough views saw */
     const float *scale; /* [count] > 0, if as_start: first scale of an anchor there */
 } growth_points;
 

@@ -373,7 +373,7 @@ static void same_bits_for_all_threads_and_instructions(void **state)
 
 /* ---- edges ---- */
 
-/* Biases of the opacity head, the last K of its part. */
+/* Biases of the opacity network, its last K parameters. */
 static void set_opacity_bias(decoder *d, float value)
 {
     decoder_network networks[3];

@@ -4,8 +4,8 @@
 #ifndef GBT_TRACE_LIST16_H
 #define GBT_TRACE_LIST16_H
 
-#include "trace/list_view.h"
-#include "trace/view_records16.h"
+#include "trace/list_kernel.h"
+#include "trace/list_records16.h"
 
 /* A Gaussian as the rows of a tile read it; slopes are from the middle of the tile. */
 typedef struct list_row {
@@ -27,7 +27,7 @@ typedef struct tile_list {
                        behind it is larger; the last is infinite */
     bool any_general;
     uint16_t *general;         /* [sixteens] bit per row */
-    view_ellipsoid *ellipsoid; /* of rows that are general */
+    list_ellipsoid *ellipsoid; /* of rows that are general */
 } tile_list;
 
 /* The rays of a packet as slopes from the middle of the tile. */
@@ -39,7 +39,7 @@ typedef struct list_rays {
 
 /* Slopes of a packet's rays in the axes of the face, from (middle_a, middle_b): in double from the rays' own
    directions. */
-static inline void slope_rays(const view_frame *frame, const packet_rays *rays, const double middle[2],
+static inline void slope_rays(const list_frame *frame, const packet_rays *rays, const double middle[2],
                               list_rays *out)
 {
     const double(*dual)[3] = frame->dual;
@@ -71,7 +71,7 @@ static inline void tile_middle(const slope_box *box, double middle[2])
         middle[k] = 0.5 * ((double)box->low[k] + (double)box->high[k]);
 }
 
-static inline void read_row(const kernel_scene *scene, const view_record *r, const double middle[2],
+static inline void read_row(const kernel_scene *scene, const list_record *r, const double middle[2],
                             uint32_t pair, list_row *out)
 {
     out->a = (float)(r->a - middle[0]);
@@ -90,7 +90,7 @@ static inline void read_row(const kernel_scene *scene, const view_record *r, con
 typedef struct list_memory {
     tile_list list;
     list_row *unsorted;
-    view_shape *shape;
+    list_shape *shape;
     float *key, *bound, *across, *down; /* across, down: SHAPE_ACROSS, SHAPE_DOWN */
     uint64_t *order, *spare;
 } list_memory;
@@ -108,9 +108,9 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
     at += 16 * n;
     out->unsorted = (list_row *)(void *)at;
     at += 16 * n;
-    out->shape = (view_shape *)(void *)at;
+    out->shape = (list_shape *)(void *)at;
     at += 8 * n;
-    out->list.ellipsoid = (view_ellipsoid *)(void *)at;
+    out->list.ellipsoid = (list_ellipsoid *)(void *)at;
     at += 8 * n;
     for (int k = 0; k < SHAPE_FIELDS; k++, at += n)
         out->list.shape[k] = at;
@@ -164,10 +164,10 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
 }
 
 /* The same of a general one, on the ray through the middle. */
-static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_frame *frame,
+static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_frame *frame,
                                       const double middle[2], const list_memory *m, size_t i)
 {
-    const view_ellipsoid *e = &m->shape[i].ellipsoid;
+    const list_ellipsoid *e = &m->shape[i].ellipsoid;
     const float *record = scene->records + (size_t)m->unsorted[i].id * RECORD_FLOATS;
     const float a = (float)middle[0], b = (float)middle[1];
     float along = 0, square = 0;
@@ -288,7 +288,7 @@ static inline void place_shape(const list_memory *m, size_t from, size_t i)
             list->shape[k][i] = 0; /* is tested by itself */
         return;
     }
-    const view_outline *o = &m->shape[from].outline;
+    const list_outline *o = &m->shape[from].outline;
     list->shape[SHAPE_X][i] = row->a + o->x;
     list->shape[SHAPE_Y][i] = row->b + o->y;
     for (int k = 0; k < 3; k++)

@@ -407,7 +407,7 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
 }
 
 /* From the turned axes of a face to the Gaussians' own. */
-static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
+static void turn_sums(const kernel_scene *scene, const list_view *view, const list_face *face, size_t begin,
                       size_t end, block_sums *out)
 {
     for (size_t first = begin; first < end; first += 16) {
@@ -421,7 +421,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
         view_form form;
         gather_slots(view, first, end, by_record);
         for (size_t i = 0; i < 16; i++) {
-            const view_record *r = &view->records[first + i < end ? first + i : first];
+            const list_record *r = &view->records[first + i < end ? first + i : first];
             rows[i] = by_record[i];
             id[i] = record_id(r);
             general |= (unsigned)record_is_general(r) << i;

@@ -5,7 +5,7 @@
 #define GBT_TRACE_LIST_PARTS16_H
 
 #include "trace/list_view.h"
-#include "trace/view_records16.h"
+#include "trace/list_records16.h"
 
 /* Sixteen boxes of slopes as seen from the middle of an ellipse. */
 typedef struct boxes_about {
@@ -59,10 +59,10 @@ static inline vmask16 ellipse_meets(const boxes_about *b, const float c[3])
                        vfloat16_set1(1));
 }
 
-static size_t find_parts(const list_view *view, const view_face *face, size_t record, uint32_t *parts)
+static size_t find_parts(const list_view *view, const list_face *face, size_t record, uint32_t *parts)
 {
-    const view_record *r = &view->records[record];
-    const view_shape *shape = &view->shapes[record];
+    const list_record *r = &view->records[record];
+    const list_shape *shape = &view->shapes[record];
     size_t count = 0;
     if (record_is_general(r)) {
         for (size_t i = face->first_part; i < face->first_part + face->part_count; i++) {
@@ -73,7 +73,7 @@ static size_t find_parts(const list_view *view, const view_face *face, size_t re
         }
         return count;
     }
-    const view_outline *o = &shape->outline;
+    const list_outline *o = &shape->outline;
     const float x = (float)(r->a + (double)o->x), y = (float)(r->b + (double)o->y);
     for (size_t i = 0; i < face->groups; i++) {
         const boxes_about around = boxes_from(&view->group[face->first_group + i], x, y);

@@ -13,7 +13,7 @@
 
 #include "trace/list16.h"
 #include "trace/ray_hits.h"
-#include "trace/rows16.h"
+#include "trace/row16.h"
 
 /* Steps back, or on, that a packet is allowed per row before its rays are sorted one by one. */
 enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };

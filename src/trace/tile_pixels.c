@@ -96,7 +96,7 @@ static void repeat_active(packet_rays *p, bool parts)
 }
 
 /* Leave to a part of a tile what is its own. */
-static void keep_part(const list_view *view, const view_part *part, packet_rays *p, uint16_t *elsewhere)
+static void keep_part(const list_view *view, const list_part *part, packet_rays *p, uint16_t *elsewhere)
 {
     unsigned own = part->first ? ~p->active : 0;
     for (int lane = 0; lane < PACKET_LANES; lane++) {
@@ -109,7 +109,7 @@ static void keep_part(const list_view *view, const view_part *part, packet_rays 
 }
 
 void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
-                    const view_part *part, tile_rays *out)
+                    const list_part *part, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
     out->parts = rays->near != NULL;

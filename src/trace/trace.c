@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "trace/tile_pixels.h"
+#include "trace/tree_kernel.h"
 
 enum { RECORD_BLOCK = 512 };
 
@@ -24,7 +25,7 @@ typedef struct trace_tile { /* or the part of one that a face of a view sees */
     kernel_counters counters;
 } trace_tile;
 
-static const tile_kernel *kernel_for(cpu_isa isa) { return CPU_VARIANT(tile_kernel, isa); }
+static const tree_kernel *tree_kernel_for(cpu_isa isa) { return CPU_VARIANT(tree_kernel, isa); }
 
 static const list_kernel *list_kernel_for(cpu_isa isa) { return CPU_VARIANT(list_kernel, isa); }
 
@@ -97,7 +98,7 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
 /* ---- memory of the tiles in flight, from tile to tile ---- */
 
 typedef struct tile_scratch {
-    kernel_scratch tree;
+    tree_scratch tree;
     list_scratch list;
 } tile_scratch;
 
@@ -142,8 +143,8 @@ static void scratch_pool_free(scratch_pool *pool)
 typedef struct pass {
     trace_scene *scene;
     kernel_scene view;
-    const tile_kernel *kernel;
-    tile_forward_fn *forward;
+    const tree_kernel *tree;
+    tree_forward_fn *forward;
     const list_kernel *list; /* NULL: by `forward` and the tree */
     const ray_image *rays;
     int tiles_across;
@@ -204,8 +205,8 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
     if (p->list == NULL)
-        fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
-                                           &scratch->tree);
+        fine = fine &&
+               p->tree->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients, &scratch->tree);
     else
         fine = fine && p->list->backward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
                                          rays, d_rgb, &tile->tape, &scratch->list);
@@ -226,7 +227,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     trace_tile *tile = &p->scene->tiles[index];
     tile_rays rays;
     const list_view *view = &p->scene->lists.view;
-    const view_part *part = p->list != NULL ? &view->parts[index] : NULL;
+    const list_part *part = p->list != NULL ? &view->parts[index] : NULL;
     const size_t number = part != NULL ? part->tile : index;
     const int x0 = (int)(number % (size_t)p->tiles_across) * TILE_PIXELS,
               y0 = (int)(number / (size_t)p->tiles_across) * TILE_PIXELS;
@@ -267,11 +268,11 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     if (scene->scratch == NULL &&
         (scene->scratch = mem_calloc(1, sizeof *scene->scratch, "scratch of tiles", err)) == NULL)
         return GBT_ERR_NO_MEMORY;
-    p->kernel = kernel_for(cpu_best_isa());
+    p->tree = tree_kernel_for(cpu_best_isa());
     p->list = scene->listed ? list_kernel_for(cpu_best_isa()) : NULL;
-    p->forward = scene->kernel == TRACE_EMBREE   ? p->kernel->forward_embree
-                 : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
-                                                 : p->kernel->forward;
+    p->forward = scene->kernel == TRACE_EMBREE   ? p->tree->forward_embree
+                 : scene->kernel == TRACE_SINGLE ? p->tree->forward_single
+                                                 : p->tree->forward;
     atomic_init(&p->tape_bytes, 0);
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
@@ -290,8 +291,8 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     if (scene->kernel != TRACE_LIST)
         return GBT_OK;
     const kernel_scene view = scene_for_kernel(scene);
-    GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
-                            &scene->listed, err));
+    GBT_TRY(list_builder_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
+                              &scene->listed, err));
     if (!scene->listed && rays->near != NULL)
         return base_fail(
             err, GBT_ERR_ARGUMENT,
@@ -367,7 +368,7 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
     pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
     scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
     if (scene->listed)
-        GBT_TRY(view_lists_reserve_slots(&scene->lists, err));
+        GBT_TRY(list_builder_reserve_slots(&scene->lists, err));
     GBT_TRY(run_pass(&p, err));
     return reduce(&p, d_gaussians, weight, err);
 }
@@ -383,7 +384,7 @@ void trace_scene_free(trace_scene *scene)
     mem_free(scene->tiles);
     mem_free(scene->records);
     gradient_order_free(&scene->order);
-    view_lists_free(&scene->lists);
+    list_builder_free(&scene->lists);
     scratch_pool_free(scene->scratch);
     memset(scene, 0, sizeof *scene);
 }

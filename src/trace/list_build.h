@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_lists.h -- which Gaussians each tile of a picture may see, for rays that all start at one
+/* trace/list_build.h -- which Gaussians each tile of a picture may see, for rays that all start at one
    point. */
-#ifndef GBT_TRACE_VIEW_LISTS_H
-#define GBT_TRACE_VIEW_LISTS_H
+#ifndef GBT_TRACE_LIST_BUILD_H
+#define GBT_TRACE_LIST_BUILD_H
 
-#include "trace/list_view.h"
+#include "trace/list_kernel.h"
 #include "trace/rays.h"
 
 /** The lists of one view, and the memory they are made in, used again from view to view. Start from {0}. */
-typedef struct view_lists {
+typedef struct list_builder {
     list_view view;
     struct list_group *groups; /* internal, as all that follows */
     uint32_t *histogram;
@@ -16,7 +16,7 @@ typedef struct view_lists {
     size_t part_capacity, tile_capacity, fine_capacity, boxes_capacity, face_capacity, reached_capacity,
         record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity, histogram_capacity,
         slot_capacity, used_capacity;
-} view_lists;
+} list_builder;
 
 /**
  * Make the lists for `rays`.
@@ -26,16 +26,16 @@ typedef struct view_lists {
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; the same lists for every thread count.
  */
-gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const kernel_scene *scene,
-                           const gaussians *g, const ray_image *rays, bool *usable, gbt_error *err);
+gbt_status list_builder_make(list_builder *lists, const list_kernel *kernel, const kernel_scene *scene,
+                             const gaussians *g, const ray_image *rays, bool *usable, gbt_error *err);
 
 /** Memory for what the adjoint leaves. GBT_OK or GBT_ERR_NO_MEMORY. */
-gbt_status view_lists_reserve_slots(view_lists *lists, gbt_error *err);
+gbt_status list_builder_reserve_slots(list_builder *lists, gbt_error *err);
 
 /** Bytes that the records and pairs of the lists take, with their room to spare; not what is per tile, and
    not what the adjoint leaves. */
-size_t view_lists_bytes(const view_lists *lists);
+size_t list_builder_bytes(const list_builder *lists);
 
-void view_lists_free(view_lists *lists); /* back to {0} */
+void list_builder_free(list_builder *lists); /* back to {0} */
 
 #endif

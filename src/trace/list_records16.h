@@ -1,25 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
+/* trace/list_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
    be hit.
 
    With kappa = c / R^2, c the d2 where the response falls to alpha_min, a ray is hit where y <= lambda w1^2,
    lambda = kappa / (1 - kappa): an ellipse in (a, b) when all of the ellipsoid lies ahead. With p = q1 q4 -
    q2 q3, P = p^2 + q1^2 q5^2 and S = q3^2 q5^2 its determinant is D = S - lambda P, and everything else is
    made of sums that do not cancel while lambda P <= 3/4 S. Included by list_kernel.inc.h. */
-#ifndef GBT_TRACE_VIEW_RECORDS16_H
-#define GBT_TRACE_VIEW_RECORDS16_H
+#ifndef GBT_TRACE_LIST_RECORDS16_H
+#define GBT_TRACE_LIST_RECORDS16_H
 
 #include "trace/list_view.h"
 #include "trace/view_form16.h"
 
 /* Means of sixteen Gaussians in the axes of the view. In double, so that slopes have the digits of the
    coordinates. */
-typedef struct view_means {
+typedef struct list_means {
     double a[16], b[16];
     _Alignas(64) float slope[2][16], at[3][16];
-} view_means;
+} list_means;
 
-static inline void place_means(const gaussians *g, const view_frame *frame, size_t first, view_means *out)
+static inline void place_means(const gaussians *g, const list_frame *frame, size_t first, list_means *out)
 {
     const double(*dual)[3] = frame->dual, *o = frame->origin;
     for (int i = 0; i < 16; i++) {
@@ -80,7 +80,7 @@ static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
 }
 
 typedef struct outline_lanes {
-    vfloat16 field[8]; /* of view_outline */
+    vfloat16 field[8]; /* of list_outline */
     vmask16 holds;     /* the form holds; the others need their ellipsoids */
 } outline_lanes;
 
@@ -133,7 +133,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
 
 /* Covariances of sixteen ellipsoids in the axes of the view: k^2 times the sum of the scaled axes' squares.
  */
-static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *frame, const float at[3][16],
+static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *frame, const float at[3][16],
                                    vfloat16 cut, vfloat16 out[8])
 {
     vfloat16 axis[3][3];
@@ -164,8 +164,8 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *fr
 static void find_reached(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block)
 {
     const vfloat16 one = vfloat16_set1(1);
-    const size_t begin = block * VIEW_GRAIN,
-                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    const size_t begin = block * LIST_GRAIN,
+                 end = begin + LIST_GRAIN < g->count ? begin + LIST_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible = visible_lanes(scene, g, first, end);
         uint32_t id[16];
@@ -187,7 +187,7 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
                            vfloat16_set1(1e-5f), far,
                            vfloat16_mul(vfloat16_set1(1.001f), vfloat16_sqrt(vfloat16_div(cut, thinnest))));
         for (int f = 0; f < view->face_count; f++) {
-            const view_face *face = &view->face[f];
+            const list_face *face = &view->face[f];
             const float(*axis)[3] = face->frame.axis;
             const vfloat16 depth = dot_lanes(axis[2], from);
             vmask16 out = vfloat16_lt(vfloat16_add(depth, radius), vfloat16_set1(0));
@@ -203,29 +203,29 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
             }
             const unsigned bits = face->part_count > 0 ? visible & ~vmask16_bits(out) : 0;
             const size_t entry = (size_t)f * view->block_count + block;
-            view->reached[entry * (VIEW_GRAIN / 16) + (first - begin) / 16] = (uint16_t)bits;
+            view->reached[entry * (LIST_GRAIN / 16) + (first - begin) / 16] = (uint16_t)bits;
             view->kept[entry].records += (uint32_t)__builtin_popcount(bits);
         }
     }
 }
 
-static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_face *face,
-                              size_t block, const uint16_t *reached, view_record *records, view_shape *shapes)
+static list_kept make_records(const kernel_scene *scene, const gaussians *g, const list_face *face,
+                              size_t block, const uint16_t *reached, list_record *records, list_shape *shapes)
 {
     uint32_t count = 0, general = 0;
-    const view_frame *frame = &face->frame;
+    const list_frame *frame = &face->frame;
     const slope_box *bounds = &face->bounds;
     const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
                    high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
-    const size_t begin = block * VIEW_GRAIN,
-                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    const size_t begin = block * LIST_GRAIN,
+                 end = begin + LIST_GRAIN < g->count ? begin + LIST_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible =
             reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end);
         if (visible == 0)
             continue;
         uint32_t id[16];
-        view_means means;
+        list_means means;
         view_form form;
         for (unsigned i = 0; i < 16; i++)
             id[i] = (uint32_t)(first + i < end ? first + i : first);
@@ -271,7 +271,7 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
             memcpy(&shapes[count], eight, sizeof eight);
             if (!front && !ellipsoid_meets_box(&shapes[count].ellipsoid, bounds))
                 continue;
-            records[count] = (view_record){.a = means.a[i],
+            records[count] = (list_record){.a = means.a[i],
                                            .b = means.b[i],
                                            .q = {q[0][i], q[1][i], q[2][i], q[3][i], q[4][i]},
                                            .depth = means.at[2][i],
@@ -283,7 +283,7 @@ static view_kept make_records(const kernel_scene *scene, const gaussians *g, con
             count++;
         }
     }
-    return (view_kept){.records = count, .general = general};
+    return (list_kept){.records = count, .general = general};
 }
 
 #endif

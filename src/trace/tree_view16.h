@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view16.h -- Gaussians as seen from the common origin of a tile's rays, in the tile's frame: the form
-   of view_form16.h. Included by kernels after beam16.h. */
-#ifndef GBT_TRACE_VIEW16_H
-#define GBT_TRACE_VIEW16_H
+/* trace/tree_view16.h -- Gaussians as seen from the common origin of a tile's rays, in the tile's frame: the
+   form of view_form16.h. Included by kernels after tree_beam16.h. */
+#ifndef GBT_TRACE_TREE_VIEW16_H
+#define GBT_TRACE_TREE_VIEW16_H
 
-#include "trace/beam16.h"
+#include "trace/tree_beam16.h"
 #include "trace/view_form16.h"
 
 /* Rays of a packet in the tile's frame. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and blended.
+/* trace/tree_rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and
+   blended.
 
    Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the
    transmittance in front of a hit is the product over the rows that end before this row begins (one running
@@ -12,10 +13,11 @@
    without keys, gathers or scatters.
    Equal depths: the row order decides, which is the order of indices for Gaussians of one shape, place and
    opacity and for depths cut at t_near. Included by kernels after simd16.h. */
-#ifndef GBT_TRACE_ROWS16_H
-#define GBT_TRACE_ROWS16_H
+#ifndef GBT_TRACE_TREE_ROWS16_H
+#define GBT_TRACE_TREE_ROWS16_H
 
 #include "trace/packet_extra16.h"
+#include "trace/row16.h"
 
 enum { ROW_CAPACITY = 512, ROW_BLOCK = 4 /* rows whose windows are walked together */ };
 
@@ -45,16 +47,6 @@ typedef struct sorted_rows {
 typedef struct row_window {
     int low, high;
 } row_window;
-
-static inline vfloat16 row_load(const float *rows, int i)
-{
-    return vfloat16_load(rows + (size_t)i * PACKET_LANES);
-}
-
-static inline void row_store(float *rows, int i, vfloat16 a)
-{
-    vfloat16_store(rows + (size_t)i * PACKET_LANES, a);
-}
 
 /* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none;
    returned is the nearest of all. */

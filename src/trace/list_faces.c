@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_faces.c -- the faces of a view, the parts of tiles that each of them sees, and their slopes.
+/* trace/list_faces.c -- the faces of a view, the parts of tiles that each of them sees, and their slopes.
 
    One face, if all rays look into the half space about their middle; else the six of a cube about it. A tile
    all of whose rays lie well inside one face is that face's; the rays of others each go to the face of their
    largest component. */
-#include "trace/view_faces.h"
+#include "trace/list_faces.h"
 
 #include <float.h>
 #include <math.h>
@@ -45,7 +45,7 @@ static void find_directions(const ray_image *rays, double middle[3], double alon
         }
 }
 
-static bool make_frame(const ray_image *rays, view_frame *out)
+static bool make_frame(const ray_image *rays, list_frame *out)
 {
     double u[3], v[3], w[3];
     const float *o = rays->origin;
@@ -85,11 +85,11 @@ static bool make_frame(const ray_image *rays, view_frame *out)
 }
 
 /* Face `f` of a cube whose first face is `first`: it looks along w, -w, u, -u, v, -v for 0 to 5. */
-static view_frame turn_frame(const view_frame *first, int f)
+static list_frame turn_frame(const list_frame *first, int f)
 {
     const int look = (f / 2 + 2) % 3, a = (look + 1) % 3, b = (look + 2) % 3;
     const int from[3] = {f % 2 == 0 ? a : b, f % 2 == 0 ? b : a, look}; /* right-handed either way */
-    view_frame out = *first;
+    list_frame out = *first;
     for (int k = 0; k < 3; k++)
         for (int c = 0; c < 3; c++) {
             const bool back = k == 2 && f % 2 != 0;
@@ -140,18 +140,18 @@ static bool tile_sees(const ray_image *rays, size_t tile)
 }
 
 typedef struct face_job {
-    view_lists *lists;
+    list_builder *lists;
     const ray_image *rays;
     uint8_t *faces; /* of each tile, a bit per face */
     atomic_bool apart;
 } face_job;
 
 /* Slopes of the part's rays; false when some are too far from the axis. */
-static bool slopes_of_part(const list_view *view, const ray_image *rays, const view_part *part,
+static bool slopes_of_part(const list_view *view, const ray_image *rays, const list_part *part,
                            slope_box *out)
 {
     float dual[3][3];
-    const view_frame *frame = &view->face[part->face].frame;
+    const list_frame *frame = &view->face[part->face].frame;
     for (int k = 0; k < 9; k++)
         dual[k / 3][k % 3] = (float)frame->dual[k / 3][k % 3];
     const pixel_range at = tile_pixels(rays, part->tile);
@@ -187,7 +187,7 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
     bool near = true;
     (void)block;
     for (size_t i = begin; i < end; i++) {
-        view_part *part = &view->parts[i];
+        list_part *part = &view->parts[i];
         part->sees = tile_sees(job->rays, part->tile);
         near = slopes_of_part(view, job->rays, part, &view->boxes[i]) && near;
     }
@@ -198,7 +198,7 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
 /* ---- six faces ---- */
 
 /* Faces of the rays of a tile. */
-static unsigned faces_of_rays(const view_frame *frame, const ray_image *rays, const pixel_range *at)
+static unsigned faces_of_rays(const list_frame *frame, const ray_image *rays, const pixel_range *at)
 {
     unsigned faces = 0;
     for (int y = at->y0; y < at->y1; y++)
@@ -212,7 +212,7 @@ static unsigned faces_of_rays(const view_frame *frame, const ray_image *rays, co
 }
 
 /* Which faces see a tile: one, if it sees all rays well, best the first; else those of its rays. */
-static unsigned faces_of_tile(const view_frame *frame, const ray_image *rays, size_t tile)
+static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, size_t tile)
 {
     const pixel_range at = tile_pixels(rays, tile);
     float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
@@ -232,7 +232,7 @@ static unsigned faces_of_tile(const view_frame *frame, const ray_image *rays, si
         return 1;
     float most = component_least;
     unsigned best = 0;
-    for (int f = 0; f < VIEW_FACES; f++) {
+    for (int f = 0; f < LIST_FACES; f++) {
         const int axis = (f / 2 + 2) % 3;
         const float least = f % 2 == 0 ? low[axis] : -high[axis];
         best = least > most ? 1u << f : best;
@@ -249,7 +249,7 @@ static void find_faces(size_t block, size_t begin, size_t end, void *context)
         job->faces[i] = (uint8_t)faces_of_tile(&job->lists->view.face[0].frame, job->rays, i);
 }
 
-static gbt_status reserve_parts(view_lists *lists, size_t count, gbt_error *err)
+static gbt_status reserve_parts(list_builder *lists, size_t count, gbt_error *err)
 {
     list_view *view = &lists->view;
     view->part_count = count;
@@ -260,7 +260,7 @@ static gbt_status reserve_parts(view_lists *lists, size_t count, gbt_error *err)
 }
 
 /* With one face, parts are tiles. */
-static gbt_status parts_of_one(view_lists *lists, size_t tiles, gbt_error *err)
+static gbt_status parts_of_one(list_builder *lists, size_t tiles, gbt_error *err)
 {
     list_view *view = &lists->view;
     GBT_TRY(reserve_parts(lists, tiles, err));
@@ -268,13 +268,13 @@ static gbt_status parts_of_one(view_lists *lists, size_t tiles, gbt_error *err)
     view->face[0].first_part = 0;
     view->face[0].part_count = tiles;
     for (size_t i = 0; i < tiles; i++)
-        view->parts[i] = (view_part){.tile = (uint32_t)i, .whole = true, .first = true};
+        view->parts[i] = (list_part){.tile = (uint32_t)i, .whole = true, .first = true};
     return GBT_OK;
 }
 
 static gbt_status parts_of_six(face_job *job, size_t tiles, gbt_error *err)
 {
-    view_lists *lists = job->lists;
+    list_builder *lists = job->lists;
     list_view *view = &lists->view;
     size_t count = 0;
     GBT_TRY(mem_reserve((void **)&lists->faces, &lists->face_capacity, 0, tiles, 1, "tile lists", err));
@@ -283,17 +283,17 @@ static gbt_status parts_of_six(face_job *job, size_t tiles, gbt_error *err)
     for (size_t i = 0; i < tiles; i++)
         count += (size_t)__builtin_popcount(job->faces[i]);
     GBT_TRY(reserve_parts(lists, count, err));
-    view->face_count = VIEW_FACES;
+    view->face_count = LIST_FACES;
     count = 0;
-    for (int f = 0; f < VIEW_FACES; f++) {
-        view_face *face = &view->face[f];
+    for (int f = 0; f < LIST_FACES; f++) {
+        list_face *face = &view->face[f];
         if (f > 0)
             face->frame = turn_frame(&view->face[0].frame, f);
         face->first_part = count;
         for (size_t i = 0; i < tiles; i++) {
             const unsigned faces = job->faces[i], below = faces & ((1u << f) - 1);
             if (faces >> f & 1)
-                view->parts[count++] = (view_part){.tile = (uint32_t)i,
+                view->parts[count++] = (list_part){.tile = (uint32_t)i,
                                                    .face = (uint8_t)f,
                                                    .whole = __builtin_popcount(faces) == 1,
                                                    .first = below == 0};
@@ -321,7 +321,7 @@ static void set_lane(part_boxes *boxes, size_t lane, const slope_box *box)
     }
 }
 
-static void set_boxes(list_view *view, view_face *face)
+static void set_boxes(list_view *view, list_face *face)
 {
     face->bounds = nothing;
     for (size_t i = 0; i < face->part_count; i++)
@@ -341,12 +341,12 @@ static void set_boxes(list_view *view, view_face *face)
         }
 }
 
-static gbt_status make_boxes(view_lists *lists, gbt_error *err)
+static gbt_status make_boxes(list_builder *lists, gbt_error *err)
 {
     list_view *view = &lists->view;
     size_t boxes = 0, groups = 0;
     for (int f = 0; f < view->face_count; f++) {
-        view_face *face = &view->face[f];
+        list_face *face = &view->face[f];
         face->first_boxes = boxes;
         face->first_group = groups;
         face->boxes = (face->part_count + 15) / 16;
@@ -363,7 +363,7 @@ static gbt_status make_boxes(view_lists *lists, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status view_faces_make(view_lists *lists, const ray_image *rays, bool *usable, gbt_error *err)
+gbt_status list_faces_make(list_builder *lists, const ray_image *rays, bool *usable, gbt_error *err)
 {
     const size_t tiles = (size_t)((rays->width + TILE_PIXELS - 1) / TILE_PIXELS) *
                          (size_t)((rays->height + TILE_PIXELS - 1) / TILE_PIXELS);

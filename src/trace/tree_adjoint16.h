@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the
-   colour to the front, and add every Gaussian's sums to its record. Included by tile_kernel.inc.h.
+/* trace/tree_adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and
+   the colour to the front, and add every Gaussian's sums to its record. Included by tree_kernel.inc.h.
    docs/tracing.md has the formulas. */
-#ifndef GBT_TRACE_ADJOINT16_H
-#define GBT_TRACE_ADJOINT16_H
+#ifndef GBT_TRACE_TREE_ADJOINT16_H
+#define GBT_TRACE_TREE_ADJOINT16_H
 
-#include "trace/beam16.h"
+#include "trace/tree_beam16.h"
 #include "trace/gaussian16.h"
-#include "trace/kernel.h"
-#include "trace/rows16.h"
-#include "trace/view16.h"
+#include "trace/tree_kernel.h"
+#include "trace/tree_rows16.h"
+#include "trace/tree_view16.h"
 
 /* What one hit, or the sixteen of a row, add to a Gaussian's record. */
 static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weight, const vfloat16 v_in[3],
@@ -79,7 +79,7 @@ typedef struct adjoint_rows {
     sorted_rows sorted;
 } adjoint_rows;
 
-static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
+static bool reserve_rows(int count, tree_scratch *scratch, adjoint_rows *out)
 {
     const size_t n = ((size_t)count + 16 + ROW_BLOCK) & ~(size_t)15, wide = n * PACKET_LANES,
                  groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
@@ -233,7 +233,7 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
 /*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
 static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
                            const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                           gradient_list *out, kernel_scratch *scratch)
+                           gradient_list *out, tree_scratch *scratch)
 {
     adjoint_rows o;
     if (!reserve_rows(count, scratch, &o))
@@ -303,7 +303,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
    one operation; the rest is done for sixteen. */
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                        gradient_list *out, kernel_scratch *scratch)
+                        gradient_list *out, tree_scratch *scratch)
 {
     enum { RAW, V, COLOR = V + 3, OPACITY, CLEAR, TERM, T, BEHIND, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
@@ -383,7 +383,7 @@ static __attribute__((noinline)) size_t count_entries(const tape_entry *entry, s
 
 static bool backward(const kernel_scene *scene, const tile_rays *tile,
                      float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry, gradient_list *out,
-                     kernel_scratch *scratch)
+                     tree_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
     size_t of_packet[TILE_PACKETS] = {0};

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they touch.
-   Conservative, never exact.
+/* trace/tree_beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they
+   touch. Conservative, never exact.
 
    Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray
    is a + s (slope_u, slope_v, 1); a beam is the four planes that hold all of its rays. Included by
-   tile_kernel.inc.h. */
-#ifndef GBT_TRACE_BEAM16_H
-#define GBT_TRACE_BEAM16_H
+   tree_kernel.inc.h. */
+#ifndef GBT_TRACE_TREE_BEAM16_H
+#define GBT_TRACE_TREE_BEAM16_H
 
 #include <float.h>
 #include <math.h>

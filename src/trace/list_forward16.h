@@ -14,98 +14,98 @@ typedef struct row_queue {
 } row_queue;
 
 /* What the rays of a packet still see. */
-typedef struct packet_sight {
+typedef struct ray_limits {
     vfloat16 far;  /* hits at this depth or behind are not seen */
     vfloat16 near; /* of parts of rays: nor are hits nearer than this */
     bool parts;
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
-} packet_sight;
+} ray_limits;
 
 /* One row more, when it has a hit. */
-static inline void append_response(const list_rows *rows, size_t *count, const list_row *g, uint32_t number,
-                                   row_response r, vfloat16 alpha_max, packet_sight *sight)
+static inline void append_response(const packet_hits *rows, size_t *count, const tile_gaussian *g,
+                                   uint32_t number, row_response r, vfloat16 alpha_max, ray_limits *limits)
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
-    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, sight->far));
-    if (sight->parts)
-        hit = vmask16_and(hit, vfloat16_le(sight->near, r.t));
+    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, limits->far));
+    if (limits->parts)
+        hit = vmask16_and(hit, vfloat16_le(limits->near, r.t));
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
-    sight->product = vfloat16_fnma(sight->product, alpha, sight->product);
-    sight->reached = vfloat16_max(sight->reached, vfloat16_select(hit, r.t, zero));
+    limits->product = vfloat16_fnma(limits->product, alpha, limits->product);
+    limits->reached = vfloat16_max(limits->reached, vfloat16_select(hit, r.t, zero));
     rows->number[at] = number;
     *count += vmask16_any(hit) != 0;
 }
 
-/* `seen_by` and the rows are copied, so that compilers know what stores cannot change. */
+/* `limits` and the rows are copied, so that compilers know what stores cannot change. */
 static void evaluate_queue(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
-                           const list_rays *seen, const row_queue *queue, unsigned take, list_rows *out,
-                           packet_sight *seen_by)
+                           const packet_slopes *slopes, const row_queue *queue, unsigned take,
+                           packet_hits *out, ray_limits *limits)
 {
-    const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
-                   length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
-    const list_rows rows = *out;
-    const list_row *row = list->row;
-    packet_sight sight = *seen_by;
+    const vfloat16 a = vfloat16_load(slopes->a), b = vfloat16_load(slopes->b),
+                   length = vfloat16_load(slopes->length),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const packet_hits rows = *out;
+    const tile_gaussian *gaussian = list->gaussian;
+    ray_limits now = *limits;
     size_t count = rows.count;
     for (unsigned first = 0; first < take; first += TOGETHER) {
-        const list_row *g[TOGETHER];
+        const tile_gaussian *g[TOGETHER];
         row_response r[TOGETHER];
         for (unsigned k = 0; k < TOGETHER; k++)
-            g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
+            g[k] = &gaussian[queue->number[first + k < take ? first + k : take - 1]];
         respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (unsigned k = 0; k < TOGETHER && first + k < take; k++)
-            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &sight);
+            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &now);
     }
     out->count = count;
-    *seen_by = sight;
+    *limits = now;
 }
 
 /* All rows that can be seen. */
 static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays, bool parts,
-                        const list_rays *seen, list_rows *rows, kernel_counters *counters)
+                        const packet_slopes *slopes, packet_hits *rows, kernel_counters *counters)
 {
     const vfloat16 opaque = vfloat16_set1(0.9999f * scene->settings.transmittance_min),
-                   length = vfloat16_mul(vfloat16_load(seen->length), vfloat16_set1(0.99999f)),
+                   length = vfloat16_mul(vfloat16_load(slopes->length), vfloat16_set1(0.99999f)),
                    zero = vfloat16_set1(0);
     /* Rays that are not active see nothing. */
-    packet_sight sight = {
-        .far = vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
-        .near = parts ? vfloat16_load(rays->near) : zero,
-        .parts = parts,
-        .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
-        .reached = zero};
+    ray_limits limits = {.far =
+                             vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
+                         .near = parts ? vfloat16_load(rays->near) : zero,
+                         .parts = parts,
+                         .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
+                         .reached = zero};
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
-        const unsigned bits = rows_in_packet(list, first, seen);
+        const unsigned bits = rows_in_packet(list, first, slopes);
         queue.count += vmask16_numbers(vmask16_from_bits(bits), (uint32_t)first, queue.number + queue.count);
         const bool last = first + 16 >= list->count;
         if (queue.count < 16 && !last)
             continue;
         const unsigned take = last ? queue.count : 16;
-        evaluate_queue(scene, list, rays, seen, &queue, take, rows, &sight);
+        evaluate_queue(scene, list, rays, slopes, &queue, take, rows, &limits);
         counters->tests += (uint64_t)take * PACKET_LANES;
         queue.count -= take;
         memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
-        /* What lies behind all hits of a ray that is opaque is not seen, and left out also with packet_order,
-           which may put it in front of them; at their depth, which is 0 where they are cut there, it still
-           may be. */
+        /* Hits behind an opaque ray's last hit are skipped, also with packet_order, which may put them in
+           front of it; hits at its very depth, which may be 0, are not. */
         const vfloat16 behind =
-            vfloat16_max(vfloat16_mul(sight.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
-        sight.far =
-            vfloat16_select(vfloat16_lt(sight.product, opaque), vfloat16_min(sight.far, behind), sight.far);
+            vfloat16_max(vfloat16_mul(limits.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
+        limits.far = vfloat16_select(vfloat16_lt(limits.product, opaque), vfloat16_min(limits.far, behind),
+                                     limits.far);
         /* Those that still wait are of this sixteen. */
         const float nearest = list->nearest[first / 16 + (queue.count == 0)];
-        if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), sight.far)))
+        if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), limits.far)))
             break;
     }
 }
 
-static bool blend_list(const kernel_scene *scene, const tile_list *list, const list_rows *from,
+static bool blend_list(const kernel_scene *scene, const tile_list *list, const packet_hits *from,
                        const packet_rays *rays, bool parts, int packet, packet_output *out, hit_tape *tape,
                        kernel_counters *counters)
 {
@@ -115,7 +115,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     const bool one_order = scene->settings.packet_order;
     vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
              rgb[3] = {zero, zero, zero};
-    const list_rows copy = *from, *rows = &copy;
+    const packet_hits copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
     packet_extra extra;
@@ -133,7 +133,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
                        next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
-        const list_row *g = &list->row[rows->number[row]];
+        const tile_gaussian *g = &list->gaussian[rows->number[row]];
         const unsigned bits = vmask16_bits(blend);
         product = vfloat16_fnma(product, alpha, product);
         lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
@@ -145,7 +145,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
-            entries[kept] = (tape_entry){g->pair & ~ROW_GENERAL, (uint16_t)bits, (uint16_t)packet};
+            entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, (uint16_t)packet};
             kept += bits != 0;
         }
     }
@@ -173,7 +173,7 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
 {
     double middle[2];
     tile_list list;
-    list_rows rows;
+    packet_hits rows;
     tile_middle(&view->boxes[part], middle);
     if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
@@ -185,12 +185,12 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
     counters->candidates += (uint64_t)list.count;
     for (int p = 0; p < TILE_PACKETS; p++) {
         const packet_rays *packet = &rays->packet[p];
-        list_rays seen;
+        packet_slopes slopes;
         if (packet->active == 0)
             continue;
         counters->rays += (uint64_t)__builtin_popcount(packet->active);
-        slope_rays(part_frame(view, part), packet, middle, &seen);
-        gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
+        slope_rays(part_frame(view, part), packet, middle, &slopes);
+        gather_rows(scene, &list, packet, rays->parts, &slopes, &rows, counters);
         order_by_middle(scene, &list, &rows);
         if (!scene->settings.packet_order)
             insert_rows(&rows);

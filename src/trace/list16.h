@@ -302,7 +302,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
                       list_scratch *scratch, tile_list *out)
 {
     const size_t begin = view->first[part], count = view->first[part + 1] - begin;
-    const slope_box *box = &view->boxes[part];
+    const slope_box *box = &view->part_boxes[part];
     list_memory m;
     if (!reserve_list(scratch, count, &m))
         return false;

@@ -363,7 +363,7 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
     double middle[2];
     used_list used;
     packet_hits rows;
-    tile_middle(&view->boxes[part], middle);
+    tile_middle(&view->part_boxes[part], middle);
     if (!load_used(scene, view, part, middle, tape, scratch, &used) ||
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;

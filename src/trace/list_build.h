@@ -10,12 +10,12 @@
 /** The lists of one view, and the memory they are made in, used again from view to view. Start from {0}. */
 typedef struct list_builder {
     list_view view;
-    struct list_group *groups; /* internal, as all that follows */
-    uint32_t *histogram;
-    uint8_t *faces; /* that see each tile, a bit for each */
-    size_t part_capacity, tile_capacity, fine_capacity, boxes_capacity, face_capacity, reached_capacity,
-        record_capacity, kept_capacity, pair_capacity, first_capacity, group_capacity, histogram_capacity,
-        slot_capacity, used_capacity;
+    struct record_batch *batches; /* internal, as all that follows */
+    uint32_t *histogram;          /* [batches][parts] */
+    uint8_t *tile_faces;          /* [tiles] that see the tile, a bit for each */
+    size_t part_capacity, part_box_capacity, box16_capacity, box256_capacity, tile_face_capacity,
+        reached_capacity, record_capacity, kept_capacity, pair_capacity, first_capacity, batch_capacity,
+        histogram_capacity, slot_capacity, slot_used_capacity;
 } list_builder;
 
 /**

@@ -142,7 +142,7 @@ static bool tile_sees(const ray_image *rays, size_t tile)
 typedef struct face_job {
     list_builder *lists;
     const ray_image *rays;
-    uint8_t *faces; /* of each tile, a bit per face */
+    uint8_t *tile_faces; /* list_builder.tile_faces */
     atomic_bool apart;
 } face_job;
 
@@ -189,7 +189,7 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         list_part *part = &view->parts[i];
         part->sees = tile_sees(job->rays, part->tile);
-        near = slopes_of_part(view, job->rays, part, &view->boxes[i]) && near;
+        near = slopes_of_part(view, job->rays, part, &view->part_boxes[i]) && near;
     }
     if (!near)
         atomic_store(&job->apart, true);
@@ -246,7 +246,7 @@ static void find_faces(size_t block, size_t begin, size_t end, void *context)
     const face_job *job = context;
     (void)block;
     for (size_t i = begin; i < end; i++)
-        job->faces[i] = (uint8_t)faces_of_tile(&job->lists->view.face[0].frame, job->rays, i);
+        job->tile_faces[i] = (uint8_t)faces_of_tile(&job->lists->view.face[0].frame, job->rays, i);
 }
 
 static gbt_status reserve_parts(list_builder *lists, size_t count, gbt_error *err)
@@ -255,8 +255,8 @@ static gbt_status reserve_parts(list_builder *lists, size_t count, gbt_error *er
     view->part_count = count;
     GBT_TRY(mem_reserve((void **)&view->parts, &lists->part_capacity, 0, count, sizeof *view->parts,
                         "tile lists", err));
-    return mem_reserve((void **)&view->boxes, &lists->tile_capacity, 0, count, sizeof *view->boxes,
-                       "tile lists", err);
+    return mem_reserve((void **)&view->part_boxes, &lists->part_box_capacity, 0, count,
+                       sizeof *view->part_boxes, "tile lists", err);
 }
 
 /* With one face, parts are tiles. */
@@ -277,11 +277,12 @@ static gbt_status parts_of_six(face_job *job, size_t tiles, gbt_error *err)
     list_builder *lists = job->lists;
     list_view *view = &lists->view;
     size_t count = 0;
-    GBT_TRY(mem_reserve((void **)&lists->faces, &lists->face_capacity, 0, tiles, 1, "tile lists", err));
-    job->faces = lists->faces;
+    GBT_TRY(
+        mem_reserve((void **)&lists->tile_faces, &lists->tile_face_capacity, 0, tiles, 1, "tile lists", err));
+    job->tile_faces = lists->tile_faces;
     parallel_blocks(tiles, 16, find_faces, job);
     for (size_t i = 0; i < tiles; i++)
-        count += (size_t)__builtin_popcount(job->faces[i]);
+        count += (size_t)__builtin_popcount(job->tile_faces[i]);
     GBT_TRY(reserve_parts(lists, count, err));
     view->face_count = LIST_FACES;
     count = 0;
@@ -291,7 +292,7 @@ static gbt_status parts_of_six(face_job *job, size_t tiles, gbt_error *err)
             face->frame = turn_frame(&view->face[0].frame, f);
         face->first_part = count;
         for (size_t i = 0; i < tiles; i++) {
-            const unsigned faces = job->faces[i], below = faces & ((1u << f) - 1);
+            const unsigned faces = job->tile_faces[i], below = faces & ((1u << f) - 1);
             if (faces >> f & 1)
                 view->parts[count++] = (list_part){.tile = (uint32_t)i,
                                                    .face = (uint8_t)f,
@@ -313,7 +314,7 @@ static void widen(slope_box *box, const slope_box *other)
     }
 }
 
-static void set_lane(part_boxes *boxes, size_t lane, const slope_box *box)
+static void set_lane(box_lanes *boxes, size_t lane, const slope_box *box)
 {
     for (int k = 0; k < 2; k++) {
         boxes->edge[2 * k][lane] = box->low[k];
@@ -325,39 +326,39 @@ static void set_boxes(list_view *view, list_face *face)
 {
     face->bounds = nothing;
     for (size_t i = 0; i < face->part_count; i++)
-        widen(&face->bounds, &view->boxes[face->first_part + i]);
-    for (size_t group = 0; group < face->groups; group++)
+        widen(&face->bounds, &view->part_boxes[face->first_part + i]);
+    for (size_t outer = 0; outer < face->box256_count; outer++)
         for (size_t i = 0; i < 16; i++) {
-            const size_t at = 16 * group + i;
+            const size_t at = 16 * outer + i;
             slope_box around = nothing;
-            for (size_t lane = 0; lane < 16 && at < face->boxes; lane++) {
+            for (size_t lane = 0; lane < 16 && at < face->box16_count; lane++) {
                 const size_t part = 16 * at + lane;
                 const bool listed = part < face->part_count && view->parts[face->first_part + part].sees;
-                const slope_box *box = listed ? &view->boxes[face->first_part + part] : &nothing;
-                set_lane(&view->fine[face->first_boxes + at], lane, box);
+                const slope_box *box = listed ? &view->part_boxes[face->first_part + part] : &nothing;
+                set_lane(&view->boxes16[face->first_box16 + at], lane, box);
                 widen(&around, box);
             }
-            set_lane(&view->group[face->first_group + group], i, &around);
+            set_lane(&view->boxes256[face->first_box256 + outer], i, &around);
         }
 }
 
 static gbt_status make_boxes(list_builder *lists, gbt_error *err)
 {
     list_view *view = &lists->view;
-    size_t boxes = 0, groups = 0;
+    size_t count16 = 0, count256 = 0;
     for (int f = 0; f < view->face_count; f++) {
         list_face *face = &view->face[f];
-        face->first_boxes = boxes;
-        face->first_group = groups;
-        face->boxes = (face->part_count + 15) / 16;
-        face->groups = (face->boxes + 15) / 16;
-        boxes += face->boxes;
-        groups += face->groups;
+        face->first_box16 = count16;
+        face->first_box256 = count256;
+        face->box16_count = (face->part_count + 15) / 16;
+        face->box256_count = (face->box16_count + 15) / 16;
+        count16 += face->box16_count;
+        count256 += face->box256_count;
     }
-    GBT_TRY(mem_reserve((void **)&view->fine, &lists->fine_capacity, 0, boxes, sizeof *view->fine,
+    GBT_TRY(mem_reserve((void **)&view->boxes16, &lists->box16_capacity, 0, count16, sizeof *view->boxes16,
                         "tile lists", err));
-    GBT_TRY(mem_reserve((void **)&view->group, &lists->boxes_capacity, 0, groups, sizeof *view->group,
-                        "tile lists", err));
+    GBT_TRY(mem_reserve((void **)&view->boxes256, &lists->box256_capacity, 0, count256,
+                        sizeof *view->boxes256, "tile lists", err));
     for (int f = 0; f < view->face_count; f++)
         set_boxes(view, &view->face[f]);
     return GBT_OK;

@@ -174,7 +174,7 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
     double middle[2];
     tile_list list;
     packet_hits rows;
-    tile_middle(&view->boxes[part], middle);
+    tile_middle(&view->part_boxes[part], middle);
     if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;

@@ -42,18 +42,18 @@ typedef struct list_part {
     bool sees;  /* of some ray a part of its way is left (ray_image.near); else no Gaussian is listed */
 } list_part;
 
-/* Slopes of sixteen parts, or of sixteen such boxes: lowest a, highest a, lowest b, highest b. */
-typedef struct part_boxes {
+/* Sixteen slope_box: lowest a, highest a, lowest b, highest b. */
+typedef struct box_lanes {
     _Alignas(64) float edge[4][16];
-} part_boxes;
+} box_lanes;
 
 /* One face and its parts, which stand together. */
 typedef struct list_face {
     list_frame frame;
     slope_box bounds; /* of all its parts */
     size_t first_part, part_count;
-    size_t first_boxes, first_group; /* of its boxes; of the boxes around sixteen of those */
-    size_t boxes, groups;            /* how many */
+    size_t first_box16, box16_count; /* its part of list_view.boxes16 */
+    size_t first_box256, box256_count;
 } list_face;
 
 /* A Gaussian on the rays of a face (view_form16.h has the formulas). */
@@ -119,12 +119,12 @@ typedef struct list_view {
     int face_count;   /* 1 or LIST_FACES */
     list_part *parts; /* face by face, in the order of the tiles; with one face, a part is a tile */
     size_t part_count;
-    slope_box *boxes;   /* of each part's rays */
-    part_boxes *fine;   /* the same, face by face, */
-    part_boxes *group;  /* and boxes around sixteen of those */
-    size_t block_count; /* of Gaussians */
-    uint16_t *reached;  /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
-    list_kept *kept;    /* [face][block] */
+    slope_box *part_boxes; /* [parts] around each part's rays */
+    box_lanes *boxes16;    /* the same of sixteen parts each, face by face */
+    box_lanes *boxes256;   /* and sixteen boxes around sixteen parts each */
+    size_t block_count;    /* of Gaussians */
+    uint16_t *reached;     /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
+    list_kept *kept;       /* [face][block] */
     list_record *records;
     list_shape *shapes;   /* as many, and one more: shapes are read two at a time */
     uint32_t *slot_first; /* [records] */

@@ -142,7 +142,7 @@ static void scratch_pool_free(scratch_pool *pool)
 
 typedef struct pass {
     trace_scene *scene;
-    kernel_scene view;
+    kernel_scene inputs;
     const tree_kernel *tree;
     tree_forward_fn *forward;
     const list_kernel *list; /* NULL: by `forward` and the tree */
@@ -160,8 +160,8 @@ static bool trace_tile_rays(pass *p, trace_tile *tile, const tile_rays *rays, pa
 {
     hit_tape *tape = keep_tape ? &tile->tape : NULL;
     if (p->list == NULL)
-        return p->forward(&p->view, rays, out, tape, &scratch->tree, counters);
-    return p->list->forward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles), rays, out,
+        return p->forward(&p->inputs, rays, out, tape, &scratch->tree, counters);
+    return p->list->forward(&p->inputs, &p->scene->lists.view, (size_t)(tile - p->scene->tiles), rays, out,
                             tape, &scratch->list, counters);
 }
 
@@ -182,7 +182,7 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
         out[packet].ended = 0;
     if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
-    tile_store_pixels(p->rays, &p->view, &p->out, x0, y0, rays, out);
+    tile_store_pixels(p->rays, &p->inputs, &p->out, x0, y0, rays, out);
     const size_t bytes = hit_tape_bytes(&tile->tape);
     tile->tape_dropped = p->keep_tape &&
                          atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
@@ -205,10 +205,10 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
     if (p->list == NULL)
-        fine = fine &&
-               p->tree->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients, &scratch->tree);
+        fine = fine && p->tree->backward(&p->inputs, rays, d_rgb, tile->tape.entries, &tile->gradients,
+                                         &scratch->tree);
     else
-        fine = fine && p->list->backward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
+        fine = fine && p->list->backward(&p->inputs, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
                                          rays, d_rgb, &tile->tape, &scratch->list);
     empty_tape(p, &tile->tape);
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
@@ -238,7 +238,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
-    tile_load_rays(p->rays, &p->view.settings, x0, y0, view, part, &rays);
+    tile_load_rays(p->rays, &p->inputs.settings, x0, y0, view, part, &rays);
     tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
                  *scratch = place != NULL ? place : &own;
     const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)
@@ -290,8 +290,8 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     scene->listed = false;
     if (scene->kernel != TRACE_LIST)
         return GBT_OK;
-    const kernel_scene view = scene_for_kernel(scene);
-    GBT_TRY(list_builder_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
+    const kernel_scene inputs = scene_for_kernel(scene);
+    GBT_TRY(list_builder_make(&scene->lists, list_kernel_for(cpu_best_isa()), &inputs, scene->source, rays,
                               &scene->listed, err));
     if (!scene->listed && rays->near != NULL)
         return base_fail(
@@ -313,9 +313,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
                          "trace: parts of rays have no adjoint, and are traced by TRACE_LIST alone");
     GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
-        .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
-    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
-                   out->hit_count != NULL || out->strongest != NULL;
+        .scene = scene, .inputs = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
+    p.inputs.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
+                     out->hit_count != NULL || out->strongest != NULL;
     scene->tape_width = scene->tape_height = 0;
     GBT_TRY(run_pass(&p, err));
     if (keep_tape) {
@@ -342,7 +342,7 @@ static gbt_status reduce(const pass *p, gaussians *d_gaussians, float *weight, g
 {
     trace_scene *scene = p->scene;
     if (scene->listed)
-        return gradients_reduce_view(p->list, &p->view, &scene->lists.view, scene->source, d_gaussians,
+        return gradients_reduce_view(p->list, &p->inputs, &scene->lists.view, scene->source, d_gaussians,
                                      weight, err);
     const gradient_list **lists = mem_alloc(scene->tile_count, sizeof *lists, "gradient lists", err);
     if (lists == NULL)
@@ -365,7 +365,7 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
                          rays->height, scene->tape_width, scene->tape_height);
-    pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
+    pass p = {.scene = scene, .inputs = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
     scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
     if (scene->listed)
         GBT_TRY(list_builder_reserve_slots(&scene->lists, err));

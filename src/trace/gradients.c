@@ -178,7 +178,8 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
                         "record order", err));
     GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first,
                         "record ranges", err));
-    /* Counting sort, stable: first[id + 1] counts, then becomes the place of the next record of id. */
+    /* Counting sort, stable: first[id + 2] counts the records of id; first[id + 1] is then the place of the
+       next one, and at last where they end. */
     uint32_t *first = order->first;
     memset(first, 0, (g->count + 2) * sizeof *first);
     for (size_t i = 0; i < list_count; i++)

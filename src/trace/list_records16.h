@@ -39,7 +39,8 @@ static inline void place_means(const gaussians *g, const list_frame *frame, size
     }
 }
 
-/* Which of sixteen can be seen at all: the rule of bvh/proxy.c. */
+/* Which of sixteen can be seen at all: a coarser form of the rule of bvh/proxy.c, with one bound on the
+   extent in place of three extents. */
 static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians *g, size_t first, size_t end)
 {
     unsigned bits = 0;

@@ -41,8 +41,8 @@ typedef struct ray_image {
 /** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
 typedef struct ray_shot {
     gbt_camera camera; /* lens, size, pose, and its motion while a rolling shutter reads it out */
-    bool one_start;    /* all rays of a rolling shutter start at the centre of the camera's own pose, and look
-                          where    they look. Default false */
+    bool one_start;    /* all rays of a rolling shutter start at the centre of the camera's own pose, and keep
+                          their directions. Default false */
     double aperture_radius; /* >= 0; 0, the default, is a pinhole */
     double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where
                                it is a sphere */
@@ -73,8 +73,8 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  * Formulas: docs/cameras.md.
  * - Line i of n (row or column) of a rolling shutter is taken (i + 0.5) / n of the readout after its start.
  * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn
- * evenly for (seed, s, pixel).
- *   It goes through the point that the ray through the middle of the aperture has in focus.
+ *   evenly for (seed, s, pixel). It goes through the point that the ray through the middle of the aperture
+ *   has in focus.
  *
  * @param sample [in] 0 .. ray_shot_sample_count() - 1
  * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size

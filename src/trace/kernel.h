@@ -43,7 +43,7 @@ typedef struct packet_rays {
     _Alignas(64) float far[PACKET_LANES];           /* hits at this t_c or behind are not seen */
     _Alignas(64) float background[3][PACKET_LANES]; /* what each sees behind everything */
     /* with tile_rays.parts, which list kernels know: */
-    _Alignas(64) float near[PACKET_LANES], through[PACKET_LANES]; /* see ray_image */
+    _Alignas(64) float near[PACKET_LANES], T_front[PACKET_LANES]; /* see ray_image */
     unsigned active; /* bit per lane; 0: the packet is not traced */
 } packet_rays;
 
@@ -69,19 +69,19 @@ typedef struct tape_entry {
 typedef struct hit_tape {
     tape_entry *entries;
     size_t count, capacity;
-    float *through; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
-    size_t through_capacity;
+    float *T_left; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
+    size_t T_left_capacity;
 } hit_tape;
 
 static inline size_t hit_tape_bytes(const hit_tape *tape)
 {
-    return tape->count * sizeof *tape->entries + tape->through_capacity * sizeof *tape->through;
+    return tape->count * sizeof *tape->entries + tape->T_left_capacity * sizeof *tape->T_left;
 }
 
 static inline void hit_tape_free(hit_tape *tape)
 {
     mem_free(tape->entries);
-    mem_free(tape->through);
+    mem_free(tape->T_left);
     *tape = (hit_tape){0};
 }
 
@@ -96,7 +96,7 @@ static inline bool tape_add(hit_tape *tape, tape_entry entry)
     return true;
 }
 
-/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g =
+/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), h =
    dL/d(d2), and so on. */
 enum {
     GRADIENT_V = 0,
@@ -107,7 +107,7 @@ enum {
     GRADIENT_FLOATS = 15
 };
 typedef struct gradient_record {
-    float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d;
+    float sum[GRADIENT_FLOATS]; /* V: sum h v; VV: sum h (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d;
                                    WEIGHT: sum T alpha */
     uint32_t id;
 } gradient_record;

@@ -133,7 +133,7 @@ static bool collect_behind(packet_hits *out, const used_list *used, const vfloat
     for (int i = count; i-- > 0;) {
         const vfloat16 alpha = row_load(rows->alpha, i);
         near_row now = {.t = row_load(rows->t, i), .alpha = zero};
-        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha),
+        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), alpha),
                                 dot_lanes(used_gaussian[rows->number[i]].color, direction));
         const vmask16 hit = vfloat16_lt(zero, alpha);
         vfloat16 sum = zero;
@@ -167,7 +167,7 @@ static bool collect_behind_by_ray(packet_hits *rows, const used_list *used, cons
     vfloat16_store(last, background);
     for (int i = 0; i < (int)rows->count; i++) {
         row_store(rows->term, i,
-                  vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
+                  vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), row_load(rows->alpha, i)),
                                dot_lanes(used->gaussian[rows->number[i]].color, d_rgb)));
         row_store(rows->behind, i, vfloat16_set1(0)); /* rays without a hit in it read it, too */
     }
@@ -196,7 +196,7 @@ static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_
     const vfloat16 d_log = vfloat16_fnma(share, row_load(rows->behind, i), row_load(rows->term, i));
     *h = vfloat16_select(vfloat16_lt(alpha, alpha_max), vfloat16_mul(vfloat16_set1(-0.5f), d_log),
                          vfloat16_set1(0));
-    *weight = vfloat16_mul(row_load(rows->through, i), alpha);
+    *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
 /* The sums of a row over the rays, to those of its Gaussian. */
@@ -278,10 +278,11 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
     }
 }
 
-/* The whole adjoint where the rays have one order, from the last row to the first. `through` is T behind all
-   rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background. */
+/* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
+   all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
+ */
 static void sum_in_order(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                         const packet_slopes *slopes, const tape_entry *entry, size_t count, vfloat16 through,
+                         const packet_slopes *slopes, const tape_entry *entry, size_t count, vfloat16 T,
                          vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
 {
     const tile_gaussian *used_gaussian = used->gaussian;
@@ -310,8 +311,8 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
         }
         for (size_t k = 0; k < TOGETHER; k++) { /* the cap: see row_gradients() */
             const vfloat16 color = dot_lanes(g[k]->color, d_rgb);
-            through = vfloat16_mul(through, inverse[k]);
-            weight[k] = vfloat16_mul(through, alpha[k]);
+            T = vfloat16_mul(T, inverse[k]);
+            weight[k] = vfloat16_mul(T, alpha[k]);
             const vfloat16 d_log = vfloat16_mul(weight[k], vfloat16_sub(color, behind));
             h[k] = vfloat16_select(vfloat16_lt(alpha[k], alpha_max),
                                    vfloat16_mul(vfloat16_set1(-0.5f), d_log), zero);
@@ -340,7 +341,7 @@ static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, 
     const tape_entry *entry = tape->entries + from;
     if (scene->settings.packet_order) {
         sum_in_order(scene, used, rays, slopes, entry, count,
-                     vfloat16_load(tape->through + packet * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
+                     vfloat16_load(tape->T_left + packet * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
                      scratch->sums);
         return true;
     }

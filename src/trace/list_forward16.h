@@ -77,7 +77,7 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
                              vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
                          .near = parts ? vfloat16_load(rays->near) : zero,
                          .parts = parts,
-                         .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
+                         .product = parts ? vfloat16_load(rays->T_front) : vfloat16_set1(1),
                          .reached = zero};
     row_queue queue = {.count = 0};
     rows->count = 0;
@@ -111,7 +111,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const p
 {
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
-    const vfloat16 start = parts ? vfloat16_load(rays->through) : one;
+    const vfloat16 start = parts ? vfloat16_load(rays->T_front) : one;
     const bool one_order = scene->settings.packet_order;
     vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
              rgb[3] = {zero, zero, zero};
@@ -128,8 +128,8 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const p
     tape_entry *entries = tape != NULL ? tape->entries : NULL;
     for (size_t i = 0; i < rows->count; i++) {
         const int row = (int)rows->order[i];
-        const vfloat16 through = one_order ? product : row_load(rows->through, (int)i),
-                       T = vfloat16_mul(start, through), alpha = row_load(rows->alpha, row),
+        const vfloat16 T_front = one_order ? product : row_load(rows->T_front, (int)i),
+                       T = vfloat16_mul(start, T_front), alpha = row_load(rows->alpha, row),
                        next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
@@ -152,7 +152,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const p
     if (tape != NULL)
         tape->count = kept;
     if (tape != NULL && one_order)
-        vfloat16_store(tape->through + packet * PACKET_LANES, lowest);
+        vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
@@ -179,8 +179,8 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;
     if (tape != NULL && scene->settings.packet_order &&
-        mem_reserve((void **)&tape->through, &tape->through_capacity, 0, TILE_PACKETS * PACKET_LANES,
-                    sizeof *tape->through, "hit tape", NULL) != GBT_OK)
+        mem_reserve((void **)&tape->T_left, &tape->T_left_capacity, 0, TILE_PACKETS * PACKET_LANES,
+                    sizeof *tape->T_left, "hit tape", NULL) != GBT_OK)
         return false;
     counters->candidates += (uint64_t)list.count;
     for (int p = 0; p < TILE_PACKETS; p++) {

@@ -23,7 +23,7 @@ typedef struct packet_hits {
     float *t;     /* depth, hit or not */
     float *alpha; /* 0 where the ray has no hit in this row */
     /* By place in the order: */
-    float *through; /* T in front of the hit; two more stand before the first */
+    float *T_front; /* T in front of the hit; two more stand before the first */
     float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
     float *reached; /* farthest hit of all rows before this one; two more, too */
     /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
@@ -35,7 +35,7 @@ typedef struct packet_hits {
     size_t count;
     size_t steps;     /* of the last pass over them */
     vfloat16 product; /* of 1 - alpha over all rows */
-    bool crowded;     /* too many steps: `through` is found by sorting */
+    bool crowded;     /* too many steps: `T_front` is found by sorting */
 } packet_hits;
 
 static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, packet_hits *out)
@@ -45,12 +45,12 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 3 * (n + 9),
                     sizeof(float), "rows of a packet", NULL) != GBT_OK)
         return false;
-    float **field[8] = {&out->t,       &out->alpha, &out->through, &out->before,
+    float **field[8] = {&out->t,       &out->alpha, &out->T_front, &out->before,
                         &out->reached, &out->term,  &out->behind,  &out->inverse};
     float *at = scratch->rows;
     for (size_t k = 0; k < arrays; k++, at += wide)
         *field[k] = at;
-    out->through += 2 * PACKET_LANES;
+    out->T_front += 2 * PACKET_LANES;
     out->before += 2 * PACKET_LANES;
     out->reached += 2 * PACKET_LANES;
     out->key = at;
@@ -140,11 +140,11 @@ static inline const tile_gaussian *gaussian_at(const tile_list *list, const pack
 /* `count` rows from place `first` on, by index. Sorted in arrays that are not yet set. */
 static void order_by_index(const tile_list *list, packet_hits *rows, size_t first, size_t count)
 {
-    uint32_t *sorted = (uint32_t *)(void *)(rows->through + count);
+    uint32_t *sorted = (uint32_t *)(void *)(rows->T_front + count);
     for (size_t i = 0; i < count; i++)
-        memcpy(&rows->through[i], &gaussian_at(list, rows, first + i)->id, sizeof(uint32_t));
+        memcpy(&rows->T_front[i], &gaussian_at(list, rows, first + i)->id, sizeof(uint32_t));
     const uint64_t *order =
-        sort_list(rows->through, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
+        sort_list(rows->T_front, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
     for (size_t i = 0; i < count; i++)
         sorted[i] = rows->order[first + (uint32_t)order[i]];
     memcpy(rows->order + first, sorted, count * sizeof *sorted);
@@ -247,7 +247,7 @@ static inline __attribute__((always_inline)) vfloat16 step_back(const packet_hit
     do {
         const int other = (int)rows->order[--j];
         const vmask16 front = vfloat16_lt(t, row_load(rows->t, other));
-        row_store(rows->through, j, vfloat16_less_where(front, row_load(rows->through, j), alpha));
+        row_store(rows->T_front, j, vfloat16_less_where(front, row_load(rows->T_front, j), alpha));
         product = vfloat16_less_unless(front, product, row_load(rows->alpha, other));
     } while (vmask16_any(vmask16_and(vfloat16_lt(t, row_load(rows->reached, j)), hit)));
     *steps += (size_t)(from - j);
@@ -292,7 +292,7 @@ static inline void insert_row(const packet_hits *rows, insertion *s, int i, vflo
         now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
         s->crowded = s->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
     }
-    row_store(rows->through, i - 2, s->second.value);
+    row_store(rows->T_front, i - 2, s->second.value);
     s->second = s->last;
     s->last = now;
     s->before = vfloat16_fnma(s->before, alpha, s->before);
@@ -302,8 +302,8 @@ static inline void insert_row(const packet_hits *rows, insertion *s, int i, vflo
 static inline void end_insertion(packet_hits *out, const insertion *s)
 {
     const int end = (int)out->count;
-    row_store(out->through, end - 2, s->second.value);
-    row_store(out->through, end - 1, s->last.value);
+    row_store(out->T_front, end - 2, s->second.value);
+    row_store(out->T_front, end - 1, s->last.value);
     out->product = s->before;
     out->steps = s->steps;
     out->crowded = s->crowded;
@@ -350,7 +350,7 @@ static bool sort_rows_by_ray(packet_hits *rows, list_scratch *scratch)
             return false;
         float T = 1;
         for (size_t k = 0; k < count; k++) {
-            rows->through[(size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane] = T;
+            rows->T_front[(size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane] = T;
             T *= 1 - hits[k].alpha;
         }
     }

@@ -276,7 +276,7 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
 /* All arrays but those of the lenses. */
 static void free_rays(ray_image *rays)
 {
-    float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->through};
+    float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->T_front};
     for (int i = 0; i < 5; i++) {
         mem_free(*all[i]);
         *all[i] = NULL;

@@ -31,7 +31,7 @@ typedef struct ray_image {
                    there); owned */
     /* A part of each ray, when `near` is not NULL; [height * width] both, owned: */
     float *near;      /* nothing nearer than this distance is seen; not below `far`: nothing at all */
-    float *through;   /* transmittance of what lies before the part: T starts from it */
+    float *T_front;   /* transmittance of what lies before the part: T starts from it */
     camera_lens lens; /* prepared, of the shot's camera; fx is 0 when the rays were given */
     /* Kept by ray_image_from_shot() for the next poses of the same lenses, of any size. */
     ray_lens lenses[RAY_LENSES];

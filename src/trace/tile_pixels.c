@@ -46,7 +46,7 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
     p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
     if (rays->near != NULL) {
         p->near[lane] = rays->near[at];
-        p->through[lane] = rays->through[at];
+        p->T_front[lane] = rays->T_front[at];
         if (!(p->near[lane] < p->far[lane]))
             return;
     }
@@ -90,7 +90,7 @@ static void repeat_active(packet_rays *p, bool parts)
         p->far[lane] = p->far[first];
         if (parts) {
             p->near[lane] = p->near[first];
-            p->through[lane] = p->through[first];
+            p->T_front[lane] = p->T_front[first];
         }
     }
 }
@@ -145,12 +145,12 @@ static float plain_background(const trace_settings *s, size_t c)
 static void store_pixel(const ray_image *rays, const kernel_scene *scene, const trace_outputs *out, size_t at,
                         const packet_output *o, int lane)
 {
-    const float before = rays->near != NULL ? rays->through[at] : 1;
+    const float T_front = rays->near != NULL ? rays->T_front[at] : 1;
     for (size_t c = 0; c < 3; c++)
         out->rgb->pixels[3 * at + c] =
-            o == NULL ? before * plain_background(&scene->settings, c) : o->rgb[c][lane];
+            o == NULL ? T_front * plain_background(&scene->settings, c) : o->rgb[c][lane];
     if (out->transmittance != NULL)
-        out->transmittance[at] = o == NULL ? before : o->transmittance[lane];
+        out->transmittance[at] = o == NULL ? T_front : o->transmittance[lane];
     if (out->ended != NULL)
         out->ended[at] = o != NULL && (o->ended >> lane & 1) != 0;
     if (!scene->extra)

@@ -23,14 +23,14 @@ static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weigh
     vfloat16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
     for (int k = 0; k < 3; k++)
         v[k] = vfloat16_select(blended, v_in[k], zero);
-    const vfloat16 d_d2 = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw));
-    vfloat16 g[3];
+    const vfloat16 h = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw)); /* dL/d(d2) */
+    vfloat16 hv[3];
     for (int k = 0; k < 3; k++) {
-        terms[GRADIENT_V + k] = g[k] = vfloat16_mul(d_d2, v[k]);
-        terms[GRADIENT_VV + k] = vfloat16_mul(g[k], v[k]);
+        terms[GRADIENT_V + k] = hv[k] = vfloat16_mul(h, v[k]);
+        terms[GRADIENT_VV + k] = vfloat16_mul(hv[k], v[k]);
     }
-    terms[GRADIENT_VV + 3] = vfloat16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = vfloat16_mul(g[2], v[0]),
-                        terms[GRADIENT_VV + 5] = vfloat16_mul(g[0], v[1]);
+    terms[GRADIENT_VV + 3] = vfloat16_mul(hv[1], v[2]), terms[GRADIENT_VV + 4] = vfloat16_mul(hv[2], v[0]),
+                        terms[GRADIENT_VV + 5] = vfloat16_mul(hv[0], v[1]);
     terms[GRADIENT_OPACITY] = vfloat16_div(vfloat16_mul(raw, d_raw), opacity);
     for (int c = 0; c < 3; c++)
         terms[GRADIENT_COLOR + c] = vfloat16_mul(weight, d_rgb[c]);
@@ -92,7 +92,7 @@ static bool reserve_rows(int count, tree_scratch *scratch, adjoint_rows *out)
     for (int f = 0; f < FIELD_COUNT; f++, at += wide)
         out->field[f] = at;
     out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide,
-    out->sorted.before = at + 4 * wide;
+    out->sorted.T_front = at + 4 * wide;
     at += 5 * wide;
     out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n,
     out->row_far = at + 3 * n, out->row = (uint32_t *)(void *)(at + 4 * n);
@@ -338,9 +338,9 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         vfloat16_store(field[TERM] + first, vfloat16_mul(alpha, shown));
     }
     const float *clear = field[CLEAR], *term = field[TERM];
-    float *T_before = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
+    float *T_front = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
     for (int i = 0; i < count; i++) {
-        T_before[i] = transmittance;
+        T_front[i] = transmittance;
         transmittance *= clear[i];
     }
     for (int c = 0; c < 3; c++)
@@ -353,10 +353,10 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         vfloat16 v[3], terms[16];
         for (int k = 0; k < 3; k++)
             v[k] = vfloat16_load(field[V + k] + first);
-        const vfloat16 raw = vfloat16_load(field[RAW] + first), before = vfloat16_load(field[T] + first),
-                       weight = vfloat16_mul(before, vfloat16_min(raw, alpha_max)),
-                       d_alpha = vfloat16_mul(before, vfloat16_sub(vfloat16_load(field[COLOR] + first),
-                                                                   vfloat16_load(field[BEHIND] + first)));
+        const vfloat16 raw = vfloat16_load(field[RAW] + first), front = vfloat16_load(field[T] + first),
+                       weight = vfloat16_mul(front, vfloat16_min(raw, alpha_max)),
+                       d_alpha = vfloat16_mul(front, vfloat16_sub(vfloat16_load(field[COLOR] + first),
+                                                                  vfloat16_load(field[BEHIND] + first)));
         gradient_terms(d_alpha, raw, weight, v, vfloat16_load(field[OPACITY] + first), alpha_max, d_rgb,
                        terms);
         if (!add_turned(entry + first, count - first, terms, out))

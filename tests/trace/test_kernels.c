@@ -337,12 +337,12 @@ static void parts_of_rays(void **state)
     ray_image part = rays;
     part.near = mem_alloc(RAYS, sizeof *part.near, "test", NULL);
     part.far = mem_alloc(RAYS, sizeof *part.far, "test", NULL);
-    part.through = mem_alloc(RAYS, sizeof *part.through, "test", NULL);
+    part.T_front = mem_alloc(RAYS, sizeof *part.T_front, "test", NULL);
     for (int half = 0; half < 2; half++) {
         for (size_t i = 0; i < RAYS; i++) {
             part.near[i] = half == 0 ? 0 : cut[i];
             part.far[i] = half == 0 ? cut[i] : ended[i] != 0 ? 0 : INFINITY;
-            part.through[i] = half == 0 ? 1 : through[0][i];
+            part.T_front[i] = half == 0 ? 1 : through[0][i];
         }
         const trace_outputs out = {.rgb = &rgb, .transmittance = through[half], .ended = ended};
         assert_ok(trace_forward(&scene, &part, false, &out, NULL, NULL));
@@ -372,7 +372,7 @@ static void parts_of_rays(void **state)
     }
     mem_free(part.near);
     mem_free(part.far);
-    mem_free(part.through);
+    mem_free(part.T_front);
     trace_scene_free(&scene);
     image_free(&rgb);
     image_free(&sum);
@@ -414,9 +414,9 @@ static void parts_are_listed_whatever_is_near(void **state)
         assert_ok(image_alloc(&rgb[parts], SIDE, SIDE, 3, NULL));
         if (parts == 1) {
             rays.near = mem_calloc(ALL, sizeof *rays.near, "test", NULL);
-            rays.through = mem_alloc(ALL, sizeof *rays.through, "test", NULL);
+            rays.T_front = mem_alloc(ALL, sizeof *rays.T_front, "test", NULL);
             for (size_t i = 0; i < ALL; i++)
-                rays.through[i] = 1;
+                rays.T_front[i] = 1;
         }
         assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb[parts]}, NULL, NULL));
         assert_int_equal(scene.listed, parts);

@@ -181,9 +181,12 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_fram
         along += w * x;
         square += w * w;
     }
+    /* What rounding takes of ww and the root, and of coordinates as in ellipsoid_meets_box(). */
     const float near = e->center[2] - 1.0001f * sqrtf(e->ww) -
                        4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2])),
                 t = along / square, t_near = scene->settings.t_near;
+    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > 0.3 (list_faces.c). The order of keys
+       is a first one, so what is cut at t_near, or not ahead, only has to stand in front. */
     m->bound[i] = larger(0.3f * t_near, 0.99999f * near);
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }

@@ -19,12 +19,6 @@
 /* A face sees rays up to 72 degrees from its axis. */
 static const float component_least = 0.3f;
 
-static bool ray_is_sound(const float d[3])
-{
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return square > 0.99f && square < 1.01f;
-}
-
 /* ---- axes ---- */
 
 /* Sum of the sound directions among a few all over the picture, and along its rows. */
@@ -38,7 +32,7 @@ static void find_directions(const ray_image *rays, double middle[3], double alon
             const size_t x = (size_t)((rays->width - 1) * (int64_t)k / STEPS),
                          y = (size_t)((rays->height - 1) * (int64_t)i / STEPS);
             const float *d = rays->dir + 3 * (y * (size_t)rays->width + x);
-            for (int c = 0; c < 3 && ray_is_sound(d); c++) {
+            for (int c = 0; c < 3 && ray_direction_is_sound(d); c++) {
                 middle[c] += (double)d[c];
                 along[c] += (k - STEPS / 2) * (double)d[c];
             }
@@ -50,7 +44,7 @@ static bool make_frame(const ray_image *rays, list_frame *out)
     double u[3], v[3], w[3];
     const float *o = rays->origin;
     find_directions(rays, w, u);
-    if (!(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
+    if (!ray_origin_is_sound(o))
         return false;
     if (!(dvec_length(w) > 1e-3)) { /* they look everywhere */
         w[0] = w[1] = 0;
@@ -160,7 +154,7 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const l
     for (int y = at.y0; y < at.y1; y++) {
         const float *d = ray_at(rays, at.x0, y);
         for (int x = at.x0; x < at.x1; x++, d += 3) {
-            if (!ray_is_sound(d) || !part_has_ray(view, part, d))
+            if (!ray_direction_is_sound(d) || !part_has_ray(view, part, d))
                 continue;
             const float w = dual[2][0] * d[0] + dual[2][1] * d[1] + dual[2][2] * d[2], inverse = 1 / w;
             near = near && w > component_least;
@@ -172,6 +166,8 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const l
         }
     }
     for (int k = 0; k < 2 && box.low[0] <= box.high[0]; k++) {
+        /* 16 ulps of the largest slopes, tan 72 degrees; and more than the packets' boxes are opened by
+           (slope_rays). */
         const float open = 4e-6f + 2e-3f * (box.high[k] - box.low[k]);
         box.low[k] -= open;
         box.high[k] += open;
@@ -206,7 +202,7 @@ static unsigned faces_of_rays(const list_frame *frame, const ray_image *rays, co
             const float *d = ray_at(rays, x, y);
             float component[3];
             face_components(frame, d, component);
-            faces |= ray_is_sound(d) ? 1u << face_of(component) : 0;
+            faces |= ray_direction_is_sound(d) ? 1u << face_of(component) : 0;
         }
     return faces;
 }
@@ -220,7 +216,7 @@ static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, si
         for (int x = at.x0; x < at.x1; x++) {
             const float *d = ray_at(rays, x, y);
             float component[3];
-            if (!ray_is_sound(d))
+            if (!ray_direction_is_sound(d))
                 continue;
             face_components(frame, d, component);
             for (int k = 0; k < 3; k++) {

@@ -10,6 +10,7 @@
 #define GBT_TRACE_LIST_RECORDS16_H
 
 #include "trace/list_view.h"
+#include "trace/rays.h"
 #include "trace/view_form16.h"
 
 /* Means of sixteen Gaussians in the axes of the view. In double, so that slopes have the digits of the
@@ -54,13 +55,21 @@ static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians 
         if (g->opacity[at] <= scene->settings.alpha_min)
             continue;
         const bool sound = isfinite(g->opacity[at]) && g->scale_x[at] > 0 && g->scale_y[at] > 0 &&
-                           g->scale_z[at] > 0 && isfinite(color) && reach < 1e17f; /* false for NaN too */
+                           g->scale_z[at] > 0 && isfinite(color) &&
+                           reach < (float)RAY_ORIGIN_LIMIT; /* false for NaN too */
         bits |= (unsigned)sound << i;
     }
     return bits;
 }
 
-/* d2 where sixteen Gaussians end, and a little more than rounding of alpha can change. */
+/* A d2 and a hundred times what rounding takes of it: about 2^-20 of d2 = R^2 y / den, and 2^-22 of alpha,
+   which is 5e-7 of 2 ln alpha. */
+static inline vfloat16 open_square(vfloat16 square)
+{
+    return vfloat16_fma(square, vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
+}
+
+/* d2 where sixteen Gaussians end, opened for rounding. */
 static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opacity, unsigned lanes)
 {
     _Alignas(64) float cut[16] = {0};
@@ -68,7 +77,7 @@ static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opaci
     for (int i = 0; i < 16; i++)
         if (lanes >> i & 1)
             cut[i] = smaller(2 * logf(opacity[i] / scene->settings.alpha_min), radius2);
-    return vfloat16_fma(vfloat16_load(cut), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
+    return open_square(vfloat16_load(cut));
 }
 
 /* The same of opacity 1, or of their own if that is more. */
@@ -76,8 +85,7 @@ static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
 {
     const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius,
                 whole = smaller(2 * logf(1 / scene->settings.alpha_min), radius2);
-    return vfloat16_max(cut,
-                        vfloat16_fma(vfloat16_set1(whole), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f)));
+    return vfloat16_max(cut, open_square(vfloat16_set1(whole)));
 }
 
 typedef struct outline_lanes {
@@ -100,6 +108,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     const vfloat16 A = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[0]), q33),
                    B = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[1]), vfloat16_mul(q[2], q[3])),
                    C = vfloat16_div(vfloat16_fma(B, B, D), A);
+    /* 1.001: D >= S / 4, so that D has lost three bits at most, and all roundings come to about 1e-5. */
     const vfloat16 inverse = vfloat16_div(one, D), share = vfloat16_mul(lambda, inverse),
                    G = vfloat16_mul(S, inverse),
                    s = vfloat16_mul(vfloat16_mul(lambda, vfloat16_set1(1.001f)), G);
@@ -114,6 +123,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     o.field[7] = kappa;
     const vfloat16 w1_most = vfloat16_add(G, vfloat16_sqrt(vfloat16_mul(share, vfloat16_mul(G, P)))),
                    nearest = vfloat16_div(vfloat16_mul(depth, vfloat16_sub(one, kappa)), w1_most);
+    /* 1.001: no hit is so near that rounding could cut it at t_near. */
     const vmask16 ahead =
         vmask16_and(vfloat16_lt(vfloat16_set1(1.001f * scene->settings.t_near), nearest),
                     vmask16_and(vfloat16_lt(vfloat16_set1(0), depth), vfloat16_lt(vfloat16_set1(0), D)));
@@ -155,6 +165,8 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *fr
     out[5] = vfloat16_mul(cut, dot16(axis[2], axis[2]));
     out[6] = vfloat16_mul(cut, dot16(axis[0], axis[2]));
     out[7] = vfloat16_mul(cut, dot16(axis[1], axis[2]));
+    /* Twenty roundings or so, 2^-21 together; ellipsoid_meets_box() sees 1 + slope^2 times that, 11 at most
+     */
     const vfloat16 slack =
         vfloat16_mul(vfloat16_set1(0x1p-17f), vfloat16_add(out[3], vfloat16_add(out[4], out[5])));
     for (int k = 3; k < 6; k++)

@@ -93,7 +93,7 @@ static inline __attribute__((always_inline)) void respond_together(const tile_ga
     for (int k = 0; k < TOGETHER; k++) {
         exponent[k] =
             vfloat16_max(vfloat16_mul(vfloat16_set1(-g[k]->falloff), vfloat16_mul(y[k], out[k].inverse)),
-                         vfloat16_set1(-120.0f));
+                         vfloat16_set1(EXP2_LEAST));
         out[k].t = vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g[k]->depth)),
                                 vfloat16_mul(w1[k], out[k].inverse));
     }

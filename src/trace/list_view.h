@@ -171,6 +171,7 @@ static inline bool part_has_ray(const list_view *view, const list_part *part, co
 /* May a ray of these slopes meet the ellipsoid? By its tangent planes. */
 static inline bool ellipsoid_meets_box(const list_ellipsoid *e, const slope_box *box)
 {
+    /* 64 roundings of the largest coordinates; few are made. */
     const float slack = 4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2]));
     const float behind = -e->center[2] - slack;
     if (behind > 0 && behind * behind > e->ww)

@@ -4,6 +4,7 @@
 #ifndef GBT_TRACE_RAYS_H
 #define GBT_TRACE_RAYS_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -11,6 +12,9 @@
 #include "base/camera_lens.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
+
+/** Coordinates of a ray's origin are below it: squares of them have to stay finite in float. */
+#define RAY_ORIGIN_LIMIT 1e17
 
 enum { RAY_LENSES = 16 /* a photo trained on every fourth pixel of a row and a column is as many lenses */ };
 
@@ -20,7 +24,8 @@ typedef struct ray_lens {
     double *dir; /* NULL: none yet */
 } ray_lens;
 
-/** Row-major. A ray with a zero direction is invalid: it sees the background, and its transmittance is 1. */
+/** Row-major. A ray with a zero direction is invalid, to the tracer also one that is not ray_is_sound(): it
+    sees the background, and its transmittance is 1. */
 typedef struct ray_image {
     int width, height;
     float *origin; /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local
@@ -105,6 +110,29 @@ static inline size_t ray_image_count(const ray_image *rays)
 static inline const float *ray_image_origin(const ray_image *rays, size_t i)
 {
     return rays->common_origin ? rays->origin : rays->origin + 3 * i;
+}
+
+/** Of the squared length of a direction, or of several in a vector: is it a unit vector? Rounding alone is
+   far within the limits. */
+#define RAY_SQUARE_IS_SOUND(square) (((square) > 0.99f) & ((square) < 1.01f))
+
+/** False for NaN, as the next. */
+static inline bool ray_direction_is_sound(const float d[3])
+{
+    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return RAY_SQUARE_IS_SOUND(square);
+}
+
+static inline bool ray_origin_is_sound(const float o[3])
+{
+    const float limit = (float)RAY_ORIGIN_LIMIT;
+    return fabsf(o[0]) < limit && fabsf(o[1]) < limit && fabsf(o[2]) < limit;
+}
+
+/** Does the ray count? Others see the background. */
+static inline bool ray_is_sound(const float o[3], const float d[3])
+{
+    return ray_direction_is_sound(d) && ray_origin_is_sound(o);
 }
 
 /** Largest |coordinate| of an origin: what trace_build() wants to know. */

@@ -26,18 +26,11 @@ static bool packet_pixel(const ray_image *rays, int x0, int y0, int packet, size
     return x + PACKET_PIXELS <= rays->width && y + PACKET_PIXELS <= rays->height;
 }
 
-/* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
-static bool ray_is_sound(const float d[3], const float o[3])
-{
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return square > 0.99f && square < 1.01f && fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
-}
-
 /* A ray of the packet; it is not active when it is outside the image or none. */
 static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 {
     const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
-    if (!ray_is_sound(d, o))
+    if (!ray_is_sound(o, d))
         return;
     for (int axis = 0; axis < 3; axis++) {
         p->dir[axis][lane] = d[axis];
@@ -57,7 +50,7 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
 {
     const float *o = rays->origin;
-    const bool here = fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
+    const bool here = ray_origin_is_sound(o);
     const four_ints lane_bits = {1, 2, 4, 8};
     four_ints sound = {0, 0, 0, 0};
     for (int row = 0; row < PACKET_PIXELS; row++) {
@@ -65,8 +58,8 @@ static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *
         load_triples(rays->dir + 3 * (first + (size_t)row * (size_t)rays->width), d);
         for (int axis = 0; axis < 3; axis++)
             four_store(p->dir[axis] + PACKET_PIXELS * row, d[axis]);
-        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; /* as ray_is_sound */
-        sound |= (square > 0.99f) & (square < 1.01f) & (lane_bits << (PACKET_PIXELS * row));
+        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        sound |= RAY_SQUARE_IS_SOUND(square) & (lane_bits << (PACKET_PIXELS * row));
     }
     for (int axis = 0; axis < 3; axis++)
         for (int lane = 0; lane < PACKET_LANES; lane++)

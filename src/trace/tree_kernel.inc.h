@@ -203,6 +203,7 @@ static inline void take_leaf(tile_state *s, const kernel_scene *scene, const tre
     unsigned inside, front = 0;
     if (s->common_origin) {
         vfloat16 slope[4];
+        /* 1.001: no hit is so near that rounding could cut it at t_near; 2^-20: as in make_beam() */
         front = vmask16_bits(ellipsoid_slopes(&e, 1.001f * scene->settings.t_near,
                                               0x1p-20f * scene->coordinate_max, slope)) &
                 filled;

@@ -143,7 +143,8 @@ static ray_walk make_walk(const kernel_scene *scene, const float origin[3], cons
     axis_products(u, u, w.square[0]);
     axis_products(v, v, w.square[1]);
     axis_products(u, v, w.square[2]);
-    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2. */
+    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2; s is 16
+       roundings of the largest coordinate. */
     const float slack = 0x1p-20f * scene->coordinate_max;
     w.open = 1001 * slack * slack;
     return w;
@@ -173,6 +174,7 @@ static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(w->origin[axis]));
     for (int k = 0; k < 6; k++)
         s[k] = vfloat16_load(leaf->spread[k]);
+    /* 1.001: see make_walk(); 2^-18: the rounding of spread, as in turn_ellipsoids() */
     const vfloat16 grow = vfloat16_set1(1.001f),
                    slack = vfloat16_fma(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])),
                                         vfloat16_set1(w->open));

@@ -95,11 +95,10 @@ static inline view_response view_respond(const view_gaussians *g, int i, const v
     return r;
 }
 
-/* 2^-120 is small enough: the least alpha_min that can be set is 1e-30. */
 static inline vfloat16 view_alpha(const view_gaussians *g, int i, vfloat16 exponent)
 {
     return vfloat16_mul(vfloat16_set1(g->field[VIEW_OPACITY][i]),
-                        vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(-120.0f))));
+                        vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(EXP2_LEAST))));
 }
 
 #endif

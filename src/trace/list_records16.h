@@ -222,81 +222,100 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
     }
 }
 
+/* What sixteen Gaussians are in the axes of a face. */
+typedef struct record_lanes {
+    list_means means;
+    _Alignas(64) float q[5][16], falloff[16], outline[8][16], ellipsoid[8][16]; /* fields of list_shape */
+    unsigned holds; /* bit per Gaussian: its form holds, and it has an outline; else, an ellipsoid */
+    unsigned kept;  /* whose outlines meet the bounds of the face, and all ellipsoids */
+} record_lanes;
+
+static inline void measure_sixteen(const kernel_scene *scene, const gaussians *g, const list_face *face,
+                                   size_t first, size_t end, unsigned visible, record_lanes *out)
+{
+    const slope_box *bounds = &face->bounds;
+    uint32_t id[16];
+    view_form form;
+    for (unsigned i = 0; i < 16; i++)
+        id[i] = (uint32_t)(first + i < end ? first + i : first);
+    const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
+    place_means(g, &face->frame, first, &out->means);
+    const vfloat16 slope[2] = {vfloat16_load(out->means.slope[0]), vfloat16_load(out->means.slope[1])},
+                   depth = vfloat16_load(out->means.at[2]);
+    view_form_find(face->frame.axis, &lanes, slope[0], slope[1], depth, &form);
+    const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
+    const outline_lanes outline = find_outlines(scene, &form, depth, cut);
+    /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ in
+       rounding, and so would their order from ray to ray. */
+    const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
+    out->holds = vmask16_bits(whole) & visible;
+    vmask16 inside = vmask16_from_bits(out->holds);
+    for (int k = 0; k < 2; k++) {
+        const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];
+        inside = vmask16_and(
+            inside, vmask16_and(vfloat16_le(vfloat16_sub(middle, half), vfloat16_set1(bounds->high[k])),
+                                vfloat16_le(vfloat16_set1(bounds->low[k]), vfloat16_add(middle, half))));
+    }
+    out->kept = vmask16_bits(inside) | (visible & ~out->holds);
+    for (int k = 0; k < 5; k++)
+        vfloat16_store(out->q[k], form.q[k]);
+    vfloat16_store(out->falloff, form.falloff);
+    for (int k = 0; k < 8; k++)
+        vfloat16_store(out->outline[k], outline.field[k]);
+    if (out->holds != visible) {
+        vfloat16 field[8];
+        find_ellipsoids(&lanes, &face->frame, (const float(*)[16])out->means.at, cut, field);
+        for (int k = 0; k < 8; k++)
+            vfloat16_store(out->ellipsoid[k], field[k]);
+    }
+}
+
+/* That of lane `i`, which is Gaussian `id`. False when its ellipsoid misses the bounds. */
+static inline bool write_record(const gaussians *g, const slope_box *bounds, const record_lanes *m, int i,
+                                size_t id, list_record *record, list_shape *shape)
+{
+    const bool holds = (m->holds >> i & 1) != 0;
+    const float(*field)[16] = holds ? m->outline : m->ellipsoid;
+    float eight[8];
+    for (int k = 0; k < 8; k++)
+        eight[k] = field[k][i];
+    memcpy(shape, eight, sizeof eight);
+    if (!holds && !ellipsoid_meets_box(&shape->ellipsoid, bounds))
+        return false;
+    *record = (list_record){.a = m->means.a[i],
+                            .b = m->means.b[i],
+                            .q = {m->q[0][i], m->q[1][i], m->q[2][i], m->q[3][i], m->q[4][i]},
+                            .depth = m->means.at[2][i],
+                            .falloff = m->falloff[i],
+                            .opacity = g->opacity[id],
+                            .color = {g->red[id], g->green[id], g->blue[id]},
+                            .id = (uint32_t)id | (holds ? 0 : RECORD_GENERAL)};
+    return true;
+}
+
 static list_kept make_records(const kernel_scene *scene, const gaussians *g, const list_face *face,
                               size_t block, const uint16_t *reached, list_record *records, list_shape *shapes)
 {
-    uint32_t count = 0, general = 0;
-    const list_frame *frame = &face->frame;
-    const slope_box *bounds = &face->bounds;
-    const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
-                   high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
+    list_kept kept = {0};
     const size_t begin = block * LIST_GRAIN,
                  end = begin + LIST_GRAIN < g->count ? begin + LIST_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible =
             reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end);
+        record_lanes m;
         if (visible == 0)
             continue;
-        uint32_t id[16];
-        list_means means;
-        view_form form;
-        for (unsigned i = 0; i < 16; i++)
-            id[i] = (uint32_t)(first + i < end ? first + i : first);
-        const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
-        place_means(g, frame, first, &means);
-        const vfloat16 slope[2] = {vfloat16_load(means.slope[0]), vfloat16_load(means.slope[1])},
-                       depth = vfloat16_load(means.at[2]);
-        view_form_find(frame->axis, &lanes, slope[0], slope[1], depth, &form);
-        const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
-        const outline_lanes outline = find_outlines(scene, &form, depth, cut);
-        /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ
-           in rounding, and so would their order from ray to ray. */
-        const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
-        const unsigned holds = vmask16_bits(whole) & visible;
-        vmask16 inside = vmask16_from_bits(holds);
-        for (int k = 0; k < 2; k++) {
-            const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];
-            inside = vmask16_and(inside, vmask16_and(vfloat16_le(vfloat16_sub(middle, half), high[k]),
-                                                     vfloat16_le(low[k], vfloat16_add(middle, half))));
-        }
-        unsigned kept = vmask16_bits(inside);
-        _Alignas(64) float q[5][16], falloff[16], shape[8][16], round[8][16];
-        for (int k = 0; k < 5; k++)
-            vfloat16_store(q[k], form.q[k]);
-        vfloat16_store(falloff, form.falloff);
-        for (int k = 0; k < 8; k++)
-            vfloat16_store(shape[k], outline.field[k]);
-        if (holds != visible) {
-            vfloat16 field[8];
-            find_ellipsoids(&lanes, frame, (const float(*)[16])means.at, cut, field);
-            for (int k = 0; k < 8; k++)
-                vfloat16_store(round[k], field[k]);
-            kept |= visible & ~holds;
-        }
-        for (; kept != 0; kept &= kept - 1) {
-            const int i = __builtin_ctz(kept);
-            const size_t at = first + (size_t)i;
-            const bool front = (holds >> i & 1) != 0;
-            const float(*field)[16] = front ? (const float(*)[16])shape : (const float(*)[16])round;
-            float eight[8];
-            for (int k = 0; k < 8; k++)
-                eight[k] = field[k][i];
-            memcpy(&shapes[count], eight, sizeof eight);
-            if (!front && !ellipsoid_meets_box(&shapes[count].ellipsoid, bounds))
+        measure_sixteen(scene, g, face, first, end, visible, &m);
+        for (unsigned rest = m.kept; rest != 0; rest &= rest - 1) {
+            const int i = __builtin_ctz(rest);
+            list_record *record = &records[kept.records];
+            if (!write_record(g, &face->bounds, &m, i, first + (size_t)i, record, &shapes[kept.records]))
                 continue;
-            records[count] = (list_record){.a = means.a[i],
-                                           .b = means.b[i],
-                                           .q = {q[0][i], q[1][i], q[2][i], q[3][i], q[4][i]},
-                                           .depth = means.at[2][i],
-                                           .falloff = falloff[i],
-                                           .opacity = g->opacity[at],
-                                           .color = {g->red[at], g->green[at], g->blue[at]},
-                                           .id = (uint32_t)at | (front ? 0 : RECORD_GENERAL)};
-            general += !front;
-            count++;
+            kept.general += record_is_general(record);
+            kept.records++;
         }
     }
-    return (list_kept){.records = count, .general = general};
+    return kept;
 }
 
 #endif

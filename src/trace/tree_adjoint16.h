@@ -230,7 +230,69 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
     return add_turned(entry + first, o->sorted.count - first, turned, out);
 }
 
-/*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
+/* T alpha of every row, T c.g, and their product, the term. */
+static void weigh_rows(vfloat16 alpha_max, adjoint_rows *o)
+{
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const int count = o->sorted.count;
+    row_window window = {0};
+    for (int first = 0; first < count; first += ROW_BLOCK) {
+        vfloat16 T[ROW_BLOCK];
+        move_window(&o->sorted, first, &window);
+        window_transmittance(&o->sorted, first, &window, T);
+        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
+            const int row = (int)o->row[first + k];
+            const vmask16 blended = vfloat16_lt(row_load(o->sorted.t, first + k), infinite);
+            const vfloat16 alpha = vfloat16_min(row_load(o->field[FIELD_RAW], row), alpha_max);
+            const vfloat16 weight = vfloat16_mul(T[k], vfloat16_select(blended, alpha, zero));
+            const vfloat16 color = row_load(o->field[FIELD_COLOR], row);
+            row_store(o->field[FIELD_WEIGHT], row, weight);
+            row_store(o->field[FIELD_COLOR], row, vfloat16_mul(T[k], color));
+            row_store(o->term, first + k, vfloat16_mul(weight, color));
+        }
+    }
+}
+
+/* The sum of the terms of every row and those after it, with what is `behind` all. */
+static void sum_terms(vfloat16 behind, adjoint_rows *o)
+{
+    const int count = o->sorted.count;
+    for (int i = count; i < count + ROW_BLOCK; i++)
+        row_store(o->term, i, vfloat16_set1(0));
+    row_store(o->after, count, behind);
+    for (int i = count; i-- > 0;)
+        row_store(o->after, i, behind = vfloat16_add(behind, row_load(o->term, i)));
+}
+
+/* The sums of every row over its rays, with
+       dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
+static void sum_rays(const kernel_scene *scene, const tape_entry *entry, const vfloat16 d_rgb[3],
+                     vfloat16 alpha_max, adjoint_rows *o)
+{
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const int count = o->sorted.count;
+    row_window window = {0};
+    for (int first = 0; first < count; first += ROW_BLOCK) {
+        vfloat16 sum[ROW_BLOCK];
+        move_window(&o->sorted, first, &window);
+        window_behind(&o->sorted, first, &window, o->term, o->after, sum);
+        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
+            const int row = (int)o->row[first + k];
+            const vmask16 blended = vfloat16_lt(row_load(o->sorted.t, first + k), infinite);
+            const vfloat16 share = vfloat16_div(sum[k], row_load(o->sorted.clear, first + k)),
+                           d_alpha = vfloat16_sub(row_load(o->field[FIELD_COLOR], row), share);
+            const vfloat16 v[3] = {row_load(o->field[FIELD_V], row), row_load(o->field[FIELD_V + 1], row),
+                                   row_load(o->field[FIELD_V + 2], row)};
+            const float *record = scene->records + (size_t)entry[row].id * RECORD_FLOATS;
+            vfloat16 terms[16];
+            gradient_terms(vfloat16_select(blended, d_alpha, zero), row_load(o->field[FIELD_RAW], row),
+                           row_load(o->field[FIELD_WEIGHT], row), v, vfloat16_set1(record[RECORD_OPACITY]),
+                           alpha_max, d_rgb, terms);
+            row_store(o->field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
+        }
+    }
+}
+
 static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
                            const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
                            gradient_list *out, tree_scratch *scratch)
@@ -238,61 +300,17 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     adjoint_rows o;
     if (!reserve_rows(count, scratch, &o))
         return false;
-    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), infinite = vfloat16_set1(INFINITY),
-                   zero = vfloat16_set1(0);
+    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max);
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
         behind_all[c] = vfloat16_load(rays->background[c]);
     }
     replay_rows(scene, rays, beam, entry, d_rgb, &o);
-    const vfloat16 transmittance = sort_rows(entry, &o);
-    row_window window = {0};
-    for (int first = 0; first < count; first += ROW_BLOCK) {
-        vfloat16 T[ROW_BLOCK];
-        move_window(&o.sorted, first, &window);
-        window_transmittance(&o.sorted, first, &window, T);
-        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
-            const int row = (int)o.row[first + k];
-            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
-            const vfloat16 weight = vfloat16_mul(
-                T[k],
-                vfloat16_select(blended, vfloat16_min(row_load(o.field[FIELD_RAW], row), alpha_max), zero));
-            const vfloat16 color = row_load(o.field[FIELD_COLOR], row);
-            row_store(o.field[FIELD_WEIGHT], row, weight);
-            row_store(o.field[FIELD_COLOR], row, vfloat16_mul(T[k], color));
-            row_store(o.term, first + k, vfloat16_mul(weight, color));
-        }
-    }
-    for (int i = count; i < count + ROW_BLOCK; i++)
-        row_store(o.term, i, zero);
-    vfloat16 behind = vfloat16_mul(dot16(behind_all, d_rgb), transmittance);
-    row_store(o.after, count, behind);
-    for (int i = count; i-- > 0;)
-        row_store(o.after, i, behind = vfloat16_add(behind, row_load(o.term, i)));
-    window = (row_window){0};
-    for (int first = 0; first < count; first += ROW_BLOCK) {
-        vfloat16 sum[ROW_BLOCK];
-        move_window(&o.sorted, first, &window);
-        window_behind(&o.sorted, first, &window, o.term, o.after, sum);
-        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
-            const int row = (int)o.row[first + k];
-            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
-            const vfloat16 d_alpha =
-                vfloat16_select(blended,
-                                vfloat16_sub(row_load(o.field[FIELD_COLOR], row),
-                                             vfloat16_div(sum[k], row_load(o.sorted.clear, first + k))),
-                                zero);
-            const vfloat16 v[3] = {row_load(o.field[FIELD_V], row), row_load(o.field[FIELD_V + 1], row),
-                                   row_load(o.field[FIELD_V + 2], row)};
-            vfloat16 terms[16];
-            gradient_terms(
-                d_alpha, row_load(o.field[FIELD_RAW], row), row_load(o.field[FIELD_WEIGHT], row), v,
-                vfloat16_set1(scene->records[(size_t)entry[row].id * RECORD_FLOATS + RECORD_OPACITY]),
-                alpha_max, d_rgb, terms);
-            row_store(o.field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
-        }
-    }
+    const vfloat16 T_left = sort_rows(entry, &o);
+    weigh_rows(alpha_max, &o);
+    sum_terms(vfloat16_mul(dot16(behind_all, d_rgb), T_left), &o);
+    sum_rays(scene, entry, d_rgb, alpha_max, &o);
     for (int first = 0; first < count; first += 16)
         if (!add_rows(entry, &o, first, out))
             return false;

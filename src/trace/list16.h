@@ -65,6 +65,25 @@ static inline void slope_rays(const list_frame *frame, const packet_rays *rays, 
     }
 }
 
+/* A packet that is traced. */
+typedef struct packet_pass {
+    const kernel_scene *scene;
+    const packet_rays *rays;
+    int number; /* in the tile */
+    bool parts; /* tile_rays.parts */
+    packet_slopes slopes;
+} packet_pass;
+
+static inline void start_pass(const kernel_scene *scene, const list_frame *frame, const tile_rays *rays,
+                              int number, const double middle[2], packet_pass *out)
+{
+    out->scene = scene;
+    out->rays = &rays->packet[number];
+    out->number = number;
+    out->parts = rays->parts;
+    slope_rays(frame, out->rays, middle, &out->slopes);
+}
+
 static inline void tile_middle(const slope_box *box, double middle[2])
 {
     for (int k = 0; k < 2; k++)

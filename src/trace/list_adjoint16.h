@@ -52,15 +52,17 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
 }
 
 /* Evaluate the rows of a packet again, in the order of the tape, and find T of all of them. */
-static void replay_list(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                        const packet_slopes *slopes, const tape_entry *entry, size_t count, packet_hits *out)
+static void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
+                        packet_hits *out)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     out->count = count;
     const packet_hits rows = *out; /* what stores cannot change */
     const tile_gaussian *used_gaussian = used->gaussian;
     const uint32_t *used_number = used->number;
-    const vfloat16 a = vfloat16_load(slopes->a), b = vfloat16_load(slopes->b),
-                   length = vfloat16_load(slopes->length),
+    const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
+                   length = vfloat16_load(p->slopes.length),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max);
     insertion s = start_insertion(&rows);
     for (size_t first = 0; first < count; first += TOGETHER) {
@@ -236,14 +238,15 @@ static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint
 
 /* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
    (turn_sums). */
-static void sum_rows(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                     const packet_slopes *slopes, const vfloat16 direction[3], const packet_hits *from,
-                     gradient_slot *sums)
+static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
+                     const packet_hits *from, gradient_slot *sums)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     const packet_hits copy = *from, *const rows = &copy; /* what stores cannot change */
     const tile_gaussian *used_gaussian = used->gaussian;
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(slopes->a),
-                   b = vfloat16_load(slopes->b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
+                   b = vfloat16_load(p->slopes.b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
                    d_rgb[3] = {direction[0], direction[1], direction[2]};
     for (int first = 0; first < (int)rows->count; first += TOGETHER) {
         const tile_gaussian *g[TOGETHER];
@@ -281,14 +284,15 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
 /* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
    all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
  */
-static void sum_in_order(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                         const packet_slopes *slopes, const tape_entry *entry, size_t count, vfloat16 T,
-                         vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
+static void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
+                         vfloat16 T, vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     const tile_gaussian *used_gaussian = used->gaussian;
     const uint32_t *used_number = used->number;
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(slopes->a),
-                   b = vfloat16_load(slopes->b), length = vfloat16_load(slopes->length),
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
+                   b = vfloat16_load(p->slopes.b), length = vfloat16_load(p->slopes.length),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max),
                    d_rgb[3] = {direction[0], direction[1], direction[2]};
     for (size_t done = 0; done < count; done += TOGETHER) {
@@ -328,31 +332,29 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
     }
 }
 
-static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                              const packet_slopes *slopes, const hit_tape *tape, size_t from, size_t count,
-                              int packet, float d_rgb_in[3][PACKET_LANES], packet_hits *rows,
+static bool adjoint_of_packet(const packet_pass *p, const used_list *used, const hit_tape *tape, size_t from,
+                              size_t count, float d_rgb_in[3][PACKET_LANES], packet_hits *rows,
                               list_scratch *scratch)
 {
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
-        behind_all[c] = vfloat16_load(rays->background[c]);
+        behind_all[c] = vfloat16_load(p->rays->background[c]);
     }
     const tape_entry *entry = tape->entries + from;
-    if (scene->settings.packet_order) {
-        sum_in_order(scene, used, rays, slopes, entry, count,
-                     vfloat16_load(tape->T_left + packet * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
-                     scratch->sums);
+    if (p->scene->settings.packet_order) {
+        sum_in_order(p, used, entry, count, vfloat16_load(tape->T_left + p->number * PACKET_LANES),
+                     dot16(behind_all, d_rgb), d_rgb, scratch->sums);
         return true;
     }
-    replay_list(scene, used, rays, slopes, entry, count, rows);
+    replay_list(p, used, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
     const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), rows->product);
     if ((rows->crowded || !collect_behind(rows, used, d_rgb, background)) &&
         !collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
-    sum_rows(scene, used, rays, slopes, d_rgb, rows, scratch->sums);
+    sum_rows(p, used, d_rgb, rows, scratch->sums);
     return true;
 }
 
@@ -369,16 +371,15 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;
-    for (int p = 0; p < TILE_PACKETS; p++) {
+    for (int i = 0; i < TILE_PACKETS; i++) {
         const size_t from = at;
-        packet_slopes slopes;
-        if (rays->packet[p].active == 0)
+        packet_pass pass;
+        if (rays->packet[i].active == 0)
             continue;
-        while (at < tape->count && tape->entries[at].packet == p)
+        while (at < tape->count && tape->entries[at].packet == i)
             at++;
-        slope_rays(part_frame(view, part), &rays->packet[p], middle, &slopes);
-        if (!adjoint_of_packet(scene, &used, &rays->packet[p], &slopes, tape, from, at - from, p, d_rgb[p],
-                               &rows, scratch))
+        start_pass(scene, part_frame(view, part), rays, i, middle, &pass);
+        if (!adjoint_of_packet(&pass, &used, tape, from, at - from, d_rgb[i], &rows, scratch))
             return false;
     }
     for (size_t i = 0; i < pairs; i++) {

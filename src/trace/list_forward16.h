@@ -40,13 +40,14 @@ static inline void append_response(const packet_hits *rows, size_t *count, const
     *count += vmask16_any(hit) != 0;
 }
 
-/* `limits` and the rows are copied, so that compilers know what stores cannot change. */
-static void evaluate_queue(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
-                           const packet_slopes *slopes, const row_queue *queue, unsigned take,
+/* `limits`, the rows and pointers are copied, so that compilers know what stores cannot change. */
+static void evaluate_queue(const packet_pass *p, const tile_list *list, const row_queue *queue, unsigned take,
                            packet_hits *out, ray_limits *limits)
 {
-    const vfloat16 a = vfloat16_load(slopes->a), b = vfloat16_load(slopes->b),
-                   length = vfloat16_load(slopes->length),
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
+    const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
+                   length = vfloat16_load(p->slopes.length),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max);
     const packet_hits rows = *out;
     const tile_gaussian *gaussian = list->gaussian;
@@ -66,11 +67,13 @@ static void evaluate_queue(const kernel_scene *scene, const tile_list *list, con
 }
 
 /* All rows that can be seen. */
-static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays, bool parts,
-                        const packet_slopes *slopes, packet_hits *rows, kernel_counters *counters)
+static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
+                        kernel_counters *counters)
 {
-    const vfloat16 opaque = vfloat16_set1(0.9999f * scene->settings.transmittance_min),
-                   length = vfloat16_mul(vfloat16_load(slopes->length), vfloat16_set1(0.99999f)),
+    const packet_rays *rays = p->rays;
+    const bool parts = p->parts;
+    const vfloat16 opaque = vfloat16_set1(0.9999f * p->scene->settings.transmittance_min),
+                   length = vfloat16_mul(vfloat16_load(p->slopes.length), vfloat16_set1(0.99999f)),
                    zero = vfloat16_set1(0);
     /* Rays that are not active see nothing. */
     ray_limits limits = {.far =
@@ -82,13 +85,13 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
-        const unsigned bits = rows_in_packet(list, first, slopes);
+        const unsigned bits = rows_in_packet(list, first, &p->slopes);
         queue.count += vmask16_numbers(vmask16_from_bits(bits), (uint32_t)first, queue.number + queue.count);
         const bool last = first + 16 >= list->count;
         if (queue.count < 16 && !last)
             continue;
         const unsigned take = last ? queue.count : 16;
-        evaluate_queue(scene, list, rays, slopes, &queue, take, rows, &limits);
+        evaluate_queue(p, list, &queue, take, rows, &limits);
         counters->tests += (uint64_t)take * PACKET_LANES;
         queue.count -= take;
         memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
@@ -105,14 +108,16 @@ static void gather_rows(const kernel_scene *scene, const tile_list *list, const 
     }
 }
 
-static bool blend_list(const kernel_scene *scene, const tile_list *list, const packet_hits *from,
-                       const packet_rays *rays, bool parts, int packet, packet_output *out, hit_tape *tape,
-                       kernel_counters *counters)
+static bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
+                       packet_output *out, hit_tape *tape, kernel_counters *counters)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
-    const vfloat16 start = parts ? vfloat16_load(rays->T_front) : one;
+    const vfloat16 start = p->parts ? vfloat16_load(rays->T_front) : one;
     const bool one_order = scene->settings.packet_order;
+    const uint16_t packet = (uint16_t)p->number;
     vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
              rgb[3] = {zero, zero, zero};
     const packet_hits copy = *from, *rows = &copy;
@@ -145,7 +150,7 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const p
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
-            entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, (uint16_t)packet};
+            entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
             kept += bits != 0;
         }
     }
@@ -183,19 +188,18 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
                     sizeof *tape->T_left, "hit tape", NULL) != GBT_OK)
         return false;
     counters->candidates += (uint64_t)list.count;
-    for (int p = 0; p < TILE_PACKETS; p++) {
-        const packet_rays *packet = &rays->packet[p];
-        packet_slopes slopes;
-        if (packet->active == 0)
+    for (int i = 0; i < TILE_PACKETS; i++) {
+        packet_pass pass;
+        if (rays->packet[i].active == 0)
             continue;
-        counters->rays += (uint64_t)__builtin_popcount(packet->active);
-        slope_rays(part_frame(view, part), packet, middle, &slopes);
-        gather_rows(scene, &list, packet, rays->parts, &slopes, &rows, counters);
+        counters->rays += (uint64_t)__builtin_popcount(rays->packet[i].active);
+        start_pass(scene, part_frame(view, part), rays, i, middle, &pass);
+        gather_rows(&pass, &list, &rows, counters);
         order_by_middle(scene, &list, &rows);
         if (!scene->settings.packet_order)
             insert_rows(&rows);
         if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
-            !blend_list(scene, &list, &rows, packet, rays->parts, p, &out[p], tape, counters))
+            !blend_list(&pass, &list, &rows, &out[i], tape, counters))
             return false;
     }
     return true;

@@ -23,7 +23,7 @@ typedef struct packet_hits {
     float *t;     /* depth, hit or not */
     float *alpha; /* 0 where the ray has no hit in this row */
     /* By place in the order: */
-    float *T_front; /* T in front of the hit; two more stand before the first */
+    float *T_front; /* T in front of the hit, from 1 on; two more stand before the first */
     float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
     float *reached; /* farthest hit of all rows before this one; two more, too */
     /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a

@@ -92,7 +92,7 @@ typedef struct hit_list {
 /* One ray and what it sees of. */
 typedef struct sight {
     double origin[3], dir[3], near, far;
-    double T_front; /* T where its part begins */
+    double T_front; /* ray_image.T_front */
     bool own_order; /* hits are sorted by their depth; else by packet_depth() of these, from one origin: */
     const ray_image *rays;
     size_t middle, packet[PACKET], packet_count; /* packet: from the middle one on, those that are rays */

@@ -507,7 +507,7 @@ static void rays_of_a_file(void **state)
     }
 }
 
-/* The limit of an origin is that of each coordinate, as for cameras and files. */
+/* The limit of an origin is that of each coordinate. */
 static void sound_rays(void **state)
 {
     (void)state;

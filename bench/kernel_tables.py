@@ -64,17 +64,17 @@ def limits(kernel):
 
 
 table("Each ray in its own order, the default's cut-offs",
-      ("scene", "blended per ray", "list: forward, adjoint, all", "tile: build, forward, adjoint, all", "splats, all", "tile / list", "list / splats", "dB: list, tile, splats"),
+      ("scene", "blended per ray", "list: forward, adjoint, all", "tree: build, forward, adjoint, all", "splats, all", "tree / list", "list / splats", "dB: list, tree, splats"),
       rows_of("kernels", MODELS, lambda l, t, s: (f"{l['blended_per_ray']:.0f}", passes(l), build_and_passes(t), f"{s['core_us_per_ray']:.3f}", ratio(t, l), ratio(l, s), errors(l, t, s))))
 table("As in the first 92.5 % of training",
       ("scene", "blended per ray", "list, all", "packet: forward, adjoint, all", "splats, all", "list / splats", "packet / splats", "dB: list, packet, splats"),
       rows_of("training", MODELS, lambda l, p, s: (f"{l['blended_per_ray']:.0f}", f"{l['core_us_per_ray']:.3f}", passes(p), f"{s['core_us_per_ray']:.3f}", ratio(l, s), ratio(p, s), errors(l, p, s))))
-table("Lenses in vol100k", ("lens", "blended per ray", "list: forward, adjoint, all", "tile: build, forward, adjoint, all", "tile / list", "dB: list, tile"),
+table("Lenses in vol100k", ("lens", "blended per ray", "list: forward, adjoint, all", "tree: build, forward, adjoint, all", "tree / list", "dB: list, tree"),
       rows_of("lens", LENSES, lambda l, t: (f"{l['blended_per_ray']:.0f}", passes(l), build_and_passes(t), ratio(t, l), errors(l, t))))
 table("Embree's own traversal", ("scene", "list: forward, all", "embree: forward, all", "ratio, forward", "ratio, all"),
       rows_of("embree", MODELS, lambda l, e: (f"{forward(l):.3f}, {l['core_us_per_ray']:.3f}", f"{forward(e):.3f}, {e['core_us_per_ray']:.3f}",
                                               f"{forward(e) / forward(l):.1f}", ratio(e, l))))
-table("Rays one by one", ("scene", "tile: forward", "single: forward", "single / tile"),
+table("Rays one by one", ("scene", "tree: forward", "single: forward", "single / tree"),
       rows_of("single", MODELS, lambda t, s: (f"{t['forward_core_us_per_ray']:.3f}", f"{s['forward_core_us_per_ray']:.3f}",
                                               f"{s['forward_core_us_per_ray'] / t['forward_core_us_per_ray']:.1f}")))
 table("Instruction sets, fox", ("set", "list: forward, adjoint, all"),

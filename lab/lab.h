@@ -25,8 +25,8 @@ typedef struct lab_bench_def {
     float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
                     a .ply */
     gbt_preset preset;  /* the three numbers above win over it. Default GBT_PRESET_AS_TRAINED */
-    const char *kernel; /* "list" (default, and NULL), "packet", "tile", "single", "embree", or "splats" of
-                           the same; or some of them, as "list,tile": measured in turn and compared with the
+    const char *kernel; /* "list" (default, and NULL), "packet", "tree", "single", "embree", or "splats" of
+                           the same; or some of them, as "list,tree": measured in turn and compared with the
                            first */
 } lab_bench_def;
 

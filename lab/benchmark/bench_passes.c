@@ -24,7 +24,7 @@ enum {
 };
 
 static const char *const kernel_names[] = {
-    [TRACE_LIST] = "list",     [TRACE_TILE] = "tile",     [TRACE_SINGLE] = "single",
+    [TRACE_LIST] = "list",     [TRACE_TREE] = "tree",     [TRACE_SINGLE] = "single",
     [TRACE_EMBREE] = "embree", [BENCH_SPLATS] = "splats", [BENCH_PACKET_ORDER] = "packet"};
 
 const char *bench_kernel_name(int kernel) { return kernel_names[kernel]; }
@@ -106,7 +106,7 @@ static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
     if (sample < 0) { /* the first build: what Embree holds for it is new */
         w->figures.tree_bytes =
             w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
-        w->figures.list_bytes = w->traced.listed ? view_lists_bytes(&w->traced.lists) : 0;
+        w->figures.list_bytes = w->traced.listed ? list_builder_bytes(&w->traced.lists) : 0;
         w->figures.record_bytes = p->g->count * RECORD_FLOATS * sizeof(float);
         return GBT_OK;
     }

@@ -14,7 +14,7 @@ typedef struct bench_figures {
                                                 rays, medians */
     kernel_counters counters;                /* of one forward pass */
     size_t tree_bytes, record_bytes;
-    size_t list_bytes; /* view_lists_bytes() */
+    size_t list_bytes; /* list_builder_bytes() */
 } bench_figures;
 
 /** Splats in place of rays. */
@@ -54,10 +54,10 @@ void bench_way_free(bench_way *way);
 /** What is measured: a trace_kernel; splats in their place; lists with trace_settings.packet_order. */
 enum { BENCH_SPLATS = TRACE_EMBREE + 1, BENCH_PACKET_ORDER, BENCH_KERNELS };
 
-/** "list", "tile", "single", "embree", "splats" or "packet". */
+/** "list", "tree", "single", "embree", "splats" or "packet". */
 const char *bench_kernel_name(int kernel);
 
-/** A list of kernels, "tile,embree", of at most `capacity`; 0 when there is another word in it, or one
+/** A list of kernels, "tree,embree", of at most `capacity`; 0 when there is another word in it, or one
     twice. */
 size_t bench_kernels_parse(const char *list, int *out, size_t capacity);
 

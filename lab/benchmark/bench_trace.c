@@ -233,7 +233,7 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
     if (m.count == 0)
         return base_fail(
             err, GBT_ERR_ARGUMENT,
-            "--kernel: \"%.60s\" (wanted list, packet, tile, single, embree or splats, or some of them "
+            "--kernel: \"%.60s\" (wanted list, packet, tree, single, embree or splats, or some of them "
             "with commas between)",
             list);
     const gbt_status status = bench(&m, &traced, &want, out, err);

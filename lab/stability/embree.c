@@ -9,7 +9,7 @@
 #include "bvh/device.h"
 #include "stability/draw.h"
 
-static const trace_kernel kernels[] = {TRACE_TILE, TRACE_SINGLE, TRACE_EMBREE};
+static const trace_kernel kernels[] = {TRACE_TREE, TRACE_SINGLE, TRACE_EMBREE};
 enum { KERNELS = sizeof kernels / sizeof *kernels };
 
 static size_t boxes_of(const trace_scene *scene)

@@ -61,7 +61,7 @@ static void stacks(stability *s)
     const raster_settings splat = raster_settings_default();
     const gbt_camera camera = draw_pinhole(SIZE, SIZE, 100, here);
     drawing ours = {0}, theirs = {0};
-    trace_scene timed = {.kernel = TRACE_TILE}; /* which builds a tree; lists are made with the first rays */
+    trace_scene timed = {.kernel = TRACE_TREE}; /* which builds a tree; lists are made with the first rays */
     ray_image rays = {0};
     gaussians g = {0};
     stack_errors e = {0}, r = {0};
@@ -213,7 +213,7 @@ static double time_picture(stability *s, drawing *d, const gaussians *g, const t
 gbt_status stability_a6(stability *s)
 {
     static const double here[3] = {0, 0, 0};
-    static const trace_kernel kernels[] = {TRACE_LIST, TRACE_TILE, TRACE_SINGLE, TRACE_EMBREE};
+    static const trace_kernel kernels[] = {TRACE_LIST, TRACE_TREE, TRACE_SINGLE, TRACE_EMBREE};
     const size_t count = (size_t)stability_number(s, "gaussians");
     const gbt_camera camera =
         draw_pinhole(8, 8, 60, here); /* slopes below 0.085: every ray is well inside every Gaussian */

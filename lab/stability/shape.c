@@ -116,7 +116,7 @@ static void build_needles(stability *s, double r)
 {
     const trace_settings settings = trace_settings_default();
     gaussians g = {0};
-    trace_scene traced = {.kernel = TRACE_TILE};
+    trace_scene traced = {.kernel = TRACE_TREE};
     draw_some(s, &g, 10000);
     for (size_t i = 0; i < g.count && s->status == GBT_OK; i++) {
         const double scale[3] = {1, 1 / r, 1 / r}, white[3] = {1, 1, 1};

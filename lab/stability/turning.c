@@ -110,7 +110,7 @@ static void same_rays(stability *s)
         compare_poses(s, &t, &g, TRACE_SINGLE, &changed, &unused);
         stability_check(s, "A1a", changed, NAN,
                         "The same ray gives the same bits, whichever rays are traced beside it.");
-        compare_poses(s, &t, &g, TRACE_TILE, &changed, &most);
+        compare_poses(s, &t, &g, TRACE_TREE, &changed, &most);
         stability_check(s, "A1b", most, NAN,
                         "Tiles measure from axes of their own, so the last bits differ. Left out: %zu rays "
                         "within rounding of a tie or a cut.",

@@ -46,7 +46,7 @@ static const speed_step steps[] = {
     {KNOB_RADIUS, "2", 2, 0},
     {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
     {KNOB_KERNEL, "single", 0, TRACE_SINGLE},
-    {KNOB_KERNEL, "tile", 0, TRACE_TILE},
+    {KNOB_KERNEL, "tree", 0, TRACE_TREE},
     {KNOB_KERNEL, "list", 0, TRACE_LIST},
     {KNOB_ISA, "plain", 0, CPU_PLAIN},
     {KNOB_ISA, "neon", 0, CPU_NEON},

@@ -78,6 +78,10 @@ static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *o
 static inline int vmask16_any(vmask16 m) { return vmask16_bits(m) != 0; }
 #endif
 
+/** The smallest x of vfloat16_exp2(). 2^-120 of an opacity is far below the least alpha_min that can be set,
+    1e-30. */
+#define EXP2_LEAST (-120.0f)
+
 /** 2^x for x in [-120, 0]; largest error about 1 ulp. Taylor of 2^r to r^6 on [-1/2, 1/2], in pairs, for the
     sake of latency. */
 static inline vfloat16 vfloat16_exp2(vfloat16 x)

@@ -9,7 +9,8 @@
 #include <stdbool.h>
 
 #define PI 3.14159265358979323846
-#define GOLDEN_ANGLE 2.399963229728653 /* radians */
+#define HALF_LOG2_E 0.72134752044448170368 /* exp(-x / 2) = 2^(-x HALF_LOG2_E) */
+#define GOLDEN_ANGLE 2.399963229728653     /* radians */
 
 /** x to the precision of a float. Through memory: GCC 12 for x86-64 leaves both conversions out where it puts
    two neighbours into one register. */

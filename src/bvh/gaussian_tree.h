@@ -2,9 +2,10 @@
 /* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder
    (Wald 2014).
 
-   The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the
-   set where its response reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids
-   (proxy.h); leaves hold up to 16 of the ellipsoids themselves.
+   The proxy of Gaussian i is the ellipsoid at k = min(sqrt(2 ln(opacity / alpha_min)), radius) std-devs: the
+   set where its response reaches alpha_min, cut at the radius. Inner nodes hold the padded tight boxes of
+   these ellipsoids (proxy.h); leaves hold up to 16 of the ellipsoids themselves, k^2 1e-4 larger for
+   rounding.
 
    Both are laid out for kernels that test 16 children at once, so their layout is part of the interface. */
 #ifndef GBT_BVH_GAUSSIAN_TREE_H
@@ -26,8 +27,8 @@ typedef struct tree_node {
     uint64_t child[TREE_WIDTH]; /* address of a tree_node, or that of a tree_leaf + 1 */
 } tree_node;
 
-/** Ellipsoids { x : (x - mean)^T spread^-1 (x - mean) <= 1 }: spread = k^2 R S S R^T. Unused slots repeat the
-    first. */
+/** Ellipsoids { x : (x - mean)^T spread^-1 (x - mean) <= 1 }: spread = k^2 R S S R^T, S the scales. Unused
+   slots repeat the first. */
 typedef struct tree_leaf {
     _Alignas(64) float mean[3][TREE_WIDTH];
     float spread[6][TREE_WIDTH]; /* xx yy zz yz zx xy */

@@ -29,7 +29,7 @@ static void add_cell(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         for (size_t c = 0; c < 3; c++)
             p->out->pixels[3 * i + c] += d->part.pixels[3 * i + c];
-        d->rays.through[i] = d->left[i];
+        d->rays.T_front[i] = d->left[i];
         d->over[i] |= d->ended[i];
     }
 }
@@ -38,7 +38,7 @@ static void add_background(const picture *p, const float background[3])
 {
     for (size_t i = 0; i < ray_image_count(&p->d->rays); i++)
         for (size_t c = 0; c < 3; c++)
-            p->out->pixels[3 * i + c] += p->d->rays.through[i] * background[c];
+            p->out->pixels[3 * i + c] += p->d->rays.T_front[i] * background[c];
 }
 
 static gbt_status draw_cell(const picture *p, gbt_error *err)

@@ -60,7 +60,7 @@ void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer)
         float *out = layer + i * CELL_LAYER_FLOATS;
         for (size_t c = 0; c < 3; c++)
             out[c] = drawn->pixels[3 * i + c];
-        out[3] = d->over[i] != 0 ? -d->rays.through[i] : d->rays.through[i];
+        out[3] = d->over[i] != 0 ? -d->rays.T_front[i] : d->rays.T_front[i];
     }
 }
 

@@ -104,7 +104,7 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
 {
     const size_t count = ray_image_count(&d->rays);
     ray_image *rays = &d->rays;
-    float **const floats[] = {&rays->near, &rays->far, &rays->through, &d->left};
+    float **const floats[] = {&rays->near, &rays->far, &rays->T_front, &d->left};
     unsigned char **const bytes[] = {&d->over, &d->ended};
     if (d->part.width != rays->width || d->part.height != rays->height || rays->near == NULL) {
         image_free(&d->part);
@@ -123,8 +123,8 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
         }
     }
     for (size_t i = 0; i < count; i++) {
-        rays->through[i] = d->enter != NULL ? d->enter[i] : 1;
-        d->over[i] = !(rays->through[i] > 0);
+        rays->T_front[i] = d->enter != NULL ? d->enter[i] : 1;
+        d->over[i] = !(rays->T_front[i] > 0);
         rays->near[i] = 0;
         rays->far[i] = INFINITY;
     }

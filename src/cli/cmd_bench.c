@@ -62,10 +62,10 @@ static const option *options_bench(int *count)
          .kind = OPTION_STRING,
          .value = &def.kernel,
          .value_name = "LIST",
-         .choices = "list|packet|tile|single|embree|splats",
+         .choices = "list|packet|tree|single|embree|splats",
          .list = true,
          .help =
-             "list, packet (lists, with one order for 16 rays), tile, single, embree or splats; list,tile "
+             "list, packet (lists, with one order for 16 rays), tree, single, embree or splats; list,tree "
              "measures both alternately and compares them"},
         {.name = "repeats",
          .kind = OPTION_INT,

@@ -29,7 +29,7 @@ static inline ewa_response ewa_respond(const splat *s, float x, float y, int blo
     const vfloat16 square = vfloat16_fma(r.u, r.u, vfloat16_mul(r.v, r.v));
     r.raw = vfloat16_mul(
         vfloat16_set1(s->opacity),
-        vfloat16_exp2(vfloat16_max(vfloat16_sub(vfloat16_set1(0), square), vfloat16_set1(-120.0f))));
+        vfloat16_exp2(vfloat16_max(vfloat16_sub(vfloat16_set1(0), square), vfloat16_set1(EXP2_LEAST))));
     return r;
 }
 

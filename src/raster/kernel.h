@@ -10,9 +10,6 @@
 #include "base/memory.h"
 #include "raster/raster.h"
 
-/* Sums are of (u, v) times its root: 2^-(u^2 + v^2) = exp(-d2 / 2). */
-#define HALF_LOG2_E 0.72134752044448170368
-
 enum {
     BLOCK_PIXELS = 4, /* a block is 4 x 4 pixels: the sixteen lanes */
     BLOCKS_ACROSS = 4,
@@ -34,7 +31,7 @@ typedef struct raster_view {
 
 /* A Gaussian that is drawn: where it reaches, and what a pixel of the EWA form needs of it. With (dx, dy) =
    centre - pixel, u = chol[0] dx + chol[1] dy and v = chol[2] dy, nothing is drawn where u^2 + v^2 > reach.
-   EWA: the response is 2^-(u^2 + v^2). */
+   EWA: the response is 2^-(u^2 + v^2), so (u, v) are the canonical point times the root of HALF_LOG2_E. */
 typedef struct splat {
     double center[2];
     float chol[3], reach;

@@ -92,8 +92,8 @@ static inline ray_response ray_respond(const ray_splat *g, float opacity, const 
         r.clipped, vfloat16_set1(t_near),
         vfloat16_mul(vfloat16_fma(step, vfloat16_set1(g->sigma), vfloat16_set1(g->depth)), rays->length));
     const vfloat16 exponent = vfloat16_mul(vfloat16_set1((float)-HALF_LOG2_E), dot_rays(r.v, r.v));
-    r.raw =
-        vfloat16_mul(vfloat16_set1(opacity), vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(-120.0f))));
+    r.raw = vfloat16_mul(vfloat16_set1(opacity),
+                         vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(EXP2_LEAST))));
     return r;
 }
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/embree16.h -- packets under Embree's own traversal: every box that is crossed, evaluated, then sorted
-   ray by ray. The baseline that the tile kernel is measured against. Included by tile_kernel.inc.h. */
+   ray by ray. The baseline that the others are measured against. Included by tree_kernel.inc.h. */
 #ifndef GBT_TRACE_EMBREE16_H
 #define GBT_TRACE_EMBREE16_H
 
 #include "bvh/gaussian_scene.h"
-#include "trace/ray16.h"
+#include "trace/tree_ray16.h"
 
 _Static_assert((int)SCENE_LANES == (int)PACKET_LANES, "a packet is what Embree traces at once");
 
@@ -13,7 +13,7 @@ typedef struct embree_visit {
     const kernel_scene *scene;
     const ray_lanes *ray;
     vfloat16 far;
-    kernel_scratch *scratch;
+    tree_scratch *scratch;
     kernel_counters *counters;
     size_t count;
     bool failed;
@@ -31,7 +31,7 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
     vfloat16_store(t, r.t),
         vfloat16_store(alpha, vfloat16_min(raw, vfloat16_set1(v->scene->settings.alpha_max)));
     v->counters->tests += (uint64_t)__builtin_popcount(lanes);
-    kernel_scratch *s = v->scratch;
+    tree_scratch *s = v->scratch;
     if (v->failed ||
         mem_reserve((void **)&s->lane_hits, &s->lane_hit_capacity, v->count, v->count + PACKET_LANES,
                     sizeof *s->lane_hits, "hits of a packet", NULL) != GBT_OK) {
@@ -47,7 +47,7 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
 
 /* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL
    without memory. */
-static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES])
+static ray_hit *by_lane(tree_scratch *s, size_t count, size_t end[PACKET_LANES])
 {
     if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)),
                     sizeof(float), "hits of a packet", NULL) != GBT_OK)
@@ -67,7 +67,7 @@ static ray_hit *by_lane(kernel_scratch *s, size_t count, size_t end[PACKET_LANES
 }
 
 static bool embree_packet(const kernel_scene *scene, const packet_rays *rays, unsigned packet,
-                          packet_output *out, hit_tape *tape, kernel_scratch *scratch,
+                          packet_output *out, hit_tape *tape, tree_scratch *scratch,
                           kernel_counters *counters)
 {
     ray_lanes ray;

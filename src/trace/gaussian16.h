@@ -7,8 +7,9 @@
 #ifndef GBT_TRACE_GAUSSIAN16_H
 #define GBT_TRACE_GAUSSIAN16_H
 
-#include "trace/kernel.h"
 #include "base/simd16.h"
+#include "base/vec.h"
+#include "trace/kernel.h"
 
 typedef struct ray_lanes {
     vfloat16 origin[3], dir[3];
@@ -193,11 +194,12 @@ static inline void shortest_axis(const float *record, float normal[3])
         normal[k] = best[k] / sqrtf(square);
 }
 
-/* opacity exp(-d2 / 2). What 2^-120 cuts off is far below the least alpha_min that can be set, 1e-30. */
+/* opacity exp(-d2 / 2) */
 static inline vfloat16 response_alpha(const gaussian_lanes *g, vfloat16 d2)
 {
-    return vfloat16_mul(g->opacity, vfloat16_exp2(vfloat16_max(vfloat16_mul(vfloat16_set1(-0.72134752f), d2),
-                                                               vfloat16_set1(-120.0f))));
+    return vfloat16_mul(g->opacity,
+                        vfloat16_exp2(vfloat16_max(vfloat16_mul(vfloat16_set1((float)-HALF_LOG2_E), d2),
+                                                   vfloat16_set1(EXP2_LEAST))));
 }
 
 #endif

@@ -99,8 +99,8 @@ FASTEST_CLONE static void find_gradients(const gaussians *g, size_t first, size_
 {
     const float *scale[3] = {g->scale_x + first, g->scale_y + first, g->scale_z + first};
     const float *quat[4] = {g->quat_w + first, g->quat_x + first, g->quat_y + first, g->quat_z + first};
-    const float(*v)[VIEW_GRAIN + 16] = sums->sum + GRADIENT_V,
-                                 (*vv)[VIEW_GRAIN + 16] = sums->sum + GRADIENT_VV;
+    const float(*v)[LIST_GRAIN + 16] = sums->sum + GRADIENT_V,
+                                 (*vv)[LIST_GRAIN + 16] = sums->sum + GRADIENT_VV;
     for (size_t i = 0; i < count; i++) {
         const size_t at = from + i;
         const uint32_t mask = seen[at];
@@ -150,7 +150,7 @@ static void reduce_block(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     const reduction *job = context;
     block_sums sums;
-    uint32_t seen[VIEW_GRAIN];
+    uint32_t seen[LIST_GRAIN];
     for (size_t i = begin; i < end; i++) {
         float sum[GRADIENT_FLOATS] = {0};
         for (uint32_t k = job->first[i]; k < job->first[i + 1]; k++)
@@ -178,7 +178,8 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
                         "record order", err));
     GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first,
                         "record ranges", err));
-    /* Counting sort, stable: first[id + 1] counts, then becomes the place of the next record of id. */
+    /* Counting sort, stable: first[id + 2] counts the records of id; first[id + 1] is then the place of the
+       next one, and at last where they end. */
     uint32_t *first = order->first;
     memset(first, 0, (g->count + 2) * sizeof *first);
     for (size_t i = 0; i < list_count; i++)
@@ -193,7 +194,7 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
         }
     reduction job = {
         .g = g, .records = records, .record = order->record, .first = first, .out = out, .weight = weight};
-    parallel_blocks(g->count, VIEW_GRAIN, reduce_block, &job);
+    parallel_blocks(g->count, LIST_GRAIN, reduce_block, &job);
     return GBT_OK;
 }
 
@@ -212,7 +213,7 @@ static void add_faces(const list_reduction *job, size_t block, size_t begin, blo
     const list_view *view = job->view;
     block_sums of_face;
     for (int f = 0; f < view->face_count; f++) {
-        const view_kept *kept = &view->kept[(size_t)f * view->block_count + block];
+        const list_kept *kept = &view->kept[(size_t)f * view->block_count + block];
         job->kernel->turn_sums(job->scene, view, &view->face[f], kept->first, kept->first + kept->records,
                                &of_face);
         for (size_t k = 0; k < kept->records; k++) {
@@ -230,7 +231,7 @@ static void reduce_view_block(size_t block, size_t begin, size_t end, void *cont
 {
     const list_reduction *job = context;
     block_sums sums;
-    uint32_t seen[VIEW_GRAIN] = {0};
+    uint32_t seen[LIST_GRAIN] = {0};
     memset(&sums, 0, sizeof sums);
     add_faces(job, block, begin, &sums, seen);
     write_gradients(job->g, job->scene->records, begin, end, &sums, seen, job->out, job->weight);
@@ -243,7 +244,7 @@ gbt_status gradients_reduce_view(const list_kernel *kernel, const kernel_scene *
     gaussians_zero_padding(out);
     list_reduction job = {
         .kernel = kernel, .scene = scene, .view = view, .g = g, .out = out, .weight = weight};
-    parallel_blocks(g->count, VIEW_GRAIN, reduce_view_block, &job);
+    parallel_blocks(g->count, LIST_GRAIN, reduce_view_block, &job);
     return GBT_OK;
 }
 

@@ -4,8 +4,7 @@
 #define GBT_TRACE_GRADIENTS_H
 
 #include "base/gaussians.h"
-#include "trace/kernel.h"
-#include "trace/list_view.h"
+#include "trace/list_kernel.h"
 
 /** Forget the hash table and cut the array to what is used. GBT_OK or GBT_ERR_NO_MEMORY. */
 gbt_status gradient_list_close(gradient_list *list);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/kernel.h -- the contract between trace.c and the tile kernels.
+/* trace/kernel.h -- what trace.c and its kernels share: the rays of a tile, what they see, the tape, the
+   gradient records.
 
-   A kernel traces one tile of neighbouring packets of 16 rays. It is written once (tile_kernel.inc.h) and
-   compiled per instruction set. */
+   A kernel traces one tile of neighbouring packets of 16 rays: over its list (list_kernel.h) or through the
+   tree (tree_kernel.h). It is written once and compiled per instruction set. */
 #ifndef GBT_TRACE_KERNEL_H
 #define GBT_TRACE_KERNEL_H
 
@@ -10,7 +11,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/cpu.h"
 #include "base/memory.h"
 #include "bvh/gaussian_tree.h"
 #include "trace/settings.h"
@@ -43,7 +43,7 @@ typedef struct packet_rays {
     _Alignas(64) float far[PACKET_LANES];           /* hits at this t_c or behind are not seen */
     _Alignas(64) float background[3][PACKET_LANES]; /* what each sees behind everything */
     /* with tile_rays.parts, which list kernels know: */
-    _Alignas(64) float near[PACKET_LANES], through[PACKET_LANES]; /* see ray_image */
+    _Alignas(64) float near[PACKET_LANES], T_front[PACKET_LANES]; /* see ray_image */
     unsigned active; /* bit per lane; 0: the packet is not traced */
 } packet_rays;
 
@@ -69,19 +69,19 @@ typedef struct tape_entry {
 typedef struct hit_tape {
     tape_entry *entries;
     size_t count, capacity;
-    float *through; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
-    size_t through_capacity;
+    float *T_left; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
+    size_t T_left_capacity;
 } hit_tape;
 
 static inline size_t hit_tape_bytes(const hit_tape *tape)
 {
-    return tape->count * sizeof *tape->entries + tape->through_capacity * sizeof *tape->through;
+    return tape->count * sizeof *tape->entries + tape->T_left_capacity * sizeof *tape->T_left;
 }
 
 static inline void hit_tape_free(hit_tape *tape)
 {
     mem_free(tape->entries);
-    mem_free(tape->through);
+    mem_free(tape->T_left);
     *tape = (hit_tape){0};
 }
 
@@ -96,7 +96,7 @@ static inline bool tape_add(hit_tape *tape, tape_entry entry)
     return true;
 }
 
-/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), g =
+/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), h =
    dL/d(d2), and so on. */
 enum {
     GRADIENT_V = 0,
@@ -107,7 +107,7 @@ enum {
     GRADIENT_FLOATS = 15
 };
 typedef struct gradient_record {
-    float sum[GRADIENT_FLOATS]; /* V: sum g v; VV: sum g (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d;
+    float sum[GRADIENT_FLOATS]; /* V: sum h v; VV: sum h (v v^T), xx yy zz yz zx xy; OPACITY, COLOR: dL/d;
                                    WEIGHT: sum T alpha */
     uint32_t id;
 } gradient_record;
@@ -134,21 +134,6 @@ typedef struct ray_hit {
     float alpha;
 } ray_hit;
 
-/* Growing scratch of one worker. Start from {0}. */
-typedef struct kernel_scratch {
-    float *rows;
-    size_t row_capacity; /* floats */
-    void *hits;
-    size_t hit_bytes;
-    struct heap_entry *heap;
-    size_t heap_capacity;
-    struct lane_hit {
-        ray_hit hit;
-        uint32_t lane;
-    } * lane_hits;
-    size_t lane_hit_capacity;
-} kernel_scratch;
-
 /* The rays of a tile of pixels. */
 typedef struct tile_rays {
     packet_rays packet[TILE_PACKETS];
@@ -156,28 +141,5 @@ typedef struct tile_rays {
     bool parts;                       /* each sees a part of its way alone */
     uint16_t elsewhere[TILE_PACKETS]; /* bit per lane: its pixel is another face's (list_view.h) */
 } tile_rays;
-
-/** Trace a tile. `tape` is NULL when no adjoint will follow. False when memory ran out. */
-typedef bool tile_forward_fn(const kernel_scene *scene, const tile_rays *rays,
-                             packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
-                             kernel_counters *counters);
-
-/**
- * Adjoint of a tile: replay the hits that forward left on the tape, add to the record of every Gaussian that
- * was blended.
- *
- * @param d_rgb [in] dL/d(rgb)
- */
-typedef bool tile_backward_fn(const kernel_scene *scene, const tile_rays *rays,
-                              float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *tape,
-                              gradient_list *out, kernel_scratch *scratch);
-
-typedef struct tile_kernel {
-    tile_forward_fn *forward, *forward_single,
-        *forward_embree; /* in tiles; ray by ray; by Embree's traversal */
-    tile_backward_fn *backward;
-} tile_kernel;
-
-CPU_DECLARE_VARIANTS(tile_kernel, tile_kernel);
 
 #endif

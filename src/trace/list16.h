@@ -4,43 +4,43 @@
 #ifndef GBT_TRACE_LIST16_H
 #define GBT_TRACE_LIST16_H
 
-#include "trace/list_view.h"
-#include "trace/view_records16.h"
+#include "trace/list_kernel.h"
+#include "trace/list_records16.h"
 
-/* A Gaussian as the rows of a tile read it; slopes are from the middle of the tile. */
-typedef struct list_row {
+/* A Gaussian as the packets of a tile read it; slopes are from the middle of the tile. */
+typedef struct tile_gaussian {
     float a, b, q[5], depth, falloff, opacity, threshold, color[3];
     uint32_t id;
-    uint32_t pair; /* number in the tile's list; with ROW_GENERAL */
-} list_row;
-enum { ROW_GENERAL = 1u << 31 };
-_Static_assert(sizeof(list_row) == 64, "a cache line");
+    uint32_t pair; /* number in the tile's list; with PAIR_GENERAL */
+} tile_gaussian;
+enum { PAIR_GENERAL = 1u << 31 };
+_Static_assert(sizeof(tile_gaussian) == 64, "a cache line");
 
 /* Where the Gaussians can be hit, one array each, in their order. */
 enum { SHAPE_X, SHAPE_Y, SHAPE_CHOL, SHAPE_ACROSS = SHAPE_CHOL + 3, SHAPE_DOWN, SHAPE_FIELDS };
 
 typedef struct tile_list {
-    size_t count;  /* whole sixteens have memory */
-    list_row *row; /* [count] */
+    size_t count;            /* whole sixteens have memory */
+    tile_gaussian *gaussian; /* [count] */
     float *shape[SHAPE_FIELDS];
     float *nearest; /* [count / 16 and one more] t / |(a, b, 1)| of all hits of a sixteen and those
                        behind it is larger; the last is infinite */
     bool any_general;
-    uint16_t *general;         /* [sixteens] bit per row */
-    view_ellipsoid *ellipsoid; /* of rows that are general */
+    uint16_t *general;         /* [sixteens] bit per Gaussian */
+    list_ellipsoid *ellipsoid; /* of those that are general */
 } tile_list;
 
 /* The rays of a packet as slopes from the middle of the tile. */
-typedef struct list_rays {
+typedef struct packet_slopes {
     _Alignas(64) float a[PACKET_LANES], b[PACKET_LANES], length[PACKET_LANES];
     slope_box box;      /* of the active ones, and a little more */
-    slope_box view_box; /* the same in the axes of the face */
-} list_rays;
+    slope_box face_box; /* the same in the axes of the face */
+} packet_slopes;
 
 /* Slopes of a packet's rays in the axes of the face, from (middle_a, middle_b): in double from the rays' own
    directions. */
-static inline void slope_rays(const view_frame *frame, const packet_rays *rays, const double middle[2],
-                              list_rays *out)
+static inline void slope_rays(const list_frame *frame, const packet_rays *rays, const double middle[2],
+                              packet_slopes *out)
 {
     const double(*dual)[3] = frame->dual;
     for (int i = 0; i < PACKET_LANES; i++) {
@@ -60,9 +60,28 @@ static inline void slope_rays(const view_frame *frame, const packet_rays *rays, 
         const float open = 1e-6f + 1e-3f * (out->box.high[k] - out->box.low[k]);
         out->box.low[k] -= open;
         out->box.high[k] += open;
-        out->view_box.low[k] = (float)(middle[k] + (double)out->box.low[k]) - 1e-6f;
-        out->view_box.high[k] = (float)(middle[k] + (double)out->box.high[k]) + 1e-6f;
+        out->face_box.low[k] = (float)(middle[k] + (double)out->box.low[k]) - 1e-6f;
+        out->face_box.high[k] = (float)(middle[k] + (double)out->box.high[k]) + 1e-6f;
     }
+}
+
+/* A packet that is traced. */
+typedef struct packet_pass {
+    const kernel_scene *scene;
+    const packet_rays *rays;
+    int number; /* in the tile */
+    bool parts; /* tile_rays.parts */
+    packet_slopes slopes;
+} packet_pass;
+
+static inline void start_pass(const kernel_scene *scene, const list_frame *frame, const tile_rays *rays,
+                              int number, const double middle[2], packet_pass *out)
+{
+    out->scene = scene;
+    out->rays = &rays->packet[number];
+    out->number = number;
+    out->parts = rays->parts;
+    slope_rays(frame, out->rays, middle, &out->slopes);
 }
 
 static inline void tile_middle(const slope_box *box, double middle[2])
@@ -71,8 +90,8 @@ static inline void tile_middle(const slope_box *box, double middle[2])
         middle[k] = 0.5 * ((double)box->low[k] + (double)box->high[k]);
 }
 
-static inline void read_row(const kernel_scene *scene, const view_record *r, const double middle[2],
-                            uint32_t pair, list_row *out)
+static inline void read_gaussian(const kernel_scene *scene, const list_record *r, const double middle[2],
+                                 uint32_t pair, tile_gaussian *out)
 {
     out->a = (float)(r->a - middle[0]);
     out->b = (float)(r->b - middle[1]);
@@ -83,14 +102,14 @@ static inline void read_row(const kernel_scene *scene, const view_record *r, con
     out->threshold = larger(scene->settings.alpha_min, r->opacity * scene->radius_response);
     memcpy(out->color, r->color, sizeof r->color);
     out->id = record_id(r);
-    out->pair = pair | (record_is_general(r) ? ROW_GENERAL : 0);
+    out->pair = pair | (record_is_general(r) ? PAIR_GENERAL : 0);
 }
 
-/* Memory for the rows of a tile, and for sorting them. */
+/* Memory for the Gaussians of a tile, and for sorting them. */
 typedef struct list_memory {
     tile_list list;
-    list_row *unsorted;
-    view_shape *shape;
+    tile_gaussian *unsorted;
+    list_shape *shape;
     float *key, *bound, *across, *down; /* across, down: SHAPE_ACROSS, SHAPE_DOWN */
     uint64_t *order, *spare;
 } list_memory;
@@ -104,13 +123,13 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
         return false;
     float *at = scratch->list;
     out->list.count = count;
-    out->list.row = (list_row *)(void *)at;
+    out->list.gaussian = (tile_gaussian *)(void *)at;
     at += 16 * n;
-    out->unsorted = (list_row *)(void *)at;
+    out->unsorted = (tile_gaussian *)(void *)at;
     at += 16 * n;
-    out->shape = (view_shape *)(void *)at;
+    out->shape = (list_shape *)(void *)at;
     at += 8 * n;
-    out->list.ellipsoid = (view_ellipsoid *)(void *)at;
+    out->list.ellipsoid = (list_ellipsoid *)(void *)at;
     at += 8 * n;
     for (int k = 0; k < SHAPE_FIELDS; k++, at += n)
         out->list.shape[k] = at;
@@ -126,8 +145,8 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
 }
 
 /* t / |(a, b, 1)| where sixteen Gaussians are nearest to the middle of the tile, and a lower bound of it in
-   all of the tile; and SHAPE_ACROSS and SHAPE_DOWN. Rows and shapes have been read; those of general ones are
-   set after. */
+   all of the tile; and SHAPE_ACROSS and SHAPE_DOWN. Gaussians and shapes have been read; those of general
+   ones are set after. */
 static inline void depth_in_tile(const list_memory *m, size_t first, const float low[2], const float high[2])
 {
     const float *rows[16], *shapes[16];
@@ -164,10 +183,10 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
 }
 
 /* The same of a general one, on the ray through the middle. */
-static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_frame *frame,
+static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_frame *frame,
                                       const double middle[2], const list_memory *m, size_t i)
 {
-    const view_ellipsoid *e = &m->shape[i].ellipsoid;
+    const list_ellipsoid *e = &m->shape[i].ellipsoid;
     const float *record = scene->records + (size_t)m->unsorted[i].id * RECORD_FLOATS;
     const float a = (float)middle[0], b = (float)middle[1];
     float along = 0, square = 0;
@@ -181,15 +200,18 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const view_fram
         along += w * x;
         square += w * w;
     }
+    /* What rounding takes of ww and the root, and of coordinates as in ellipsoid_meets_box(). */
     const float near = e->center[2] - 1.0001f * sqrtf(e->ww) -
                        4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2])),
                 t = along / square, t_near = scene->settings.t_near;
+    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > 0.3 (list_faces.c). The order of keys
+       is a first one, so what is cut at t_near, or not ahead, only has to stand in front. */
     m->bound[i] = larger(0.3f * t_near, 0.99999f * near);
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }
 
-/* Numbers of the rows by the bits of their keys, then number: whatever else is in the list, two rows have one
-   order. Upper halves are equal where keys are. */
+/* Numbers by the bits of their keys, then number: whatever else is in the list, two of them have one order.
+   Upper halves are equal where keys are. */
 static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from, uint64_t *to)
 {
     enum { DIGITS = 4, VALUES = 256 };
@@ -275,22 +297,22 @@ static const uint64_t *sort_depths(float *key, size_t count, uint64_t *from, uin
     return from;
 }
 
-/* Row `i` of the order: number `from` of those read. */
+/* Gaussian `i` of the order: number `from` of those read. */
 static inline void place_shape(const list_memory *m, size_t from, size_t i)
 {
-    const list_row *row = &m->unsorted[from];
+    const tile_gaussian *g = &m->unsorted[from];
     const tile_list *list = &m->list;
-    list->row[i] = *row;
-    if (row->pair & ROW_GENERAL) {
+    list->gaussian[i] = *g;
+    if (g->pair & PAIR_GENERAL) {
         list->ellipsoid[i] = m->shape[from].ellipsoid;
         list->general[i / 16] |= (uint16_t)(1u << i % 16);
         for (int k = 0; k < SHAPE_FIELDS; k++)
             list->shape[k][i] = 0; /* is tested by itself */
         return;
     }
-    const view_outline *o = &m->shape[from].outline;
-    list->shape[SHAPE_X][i] = row->a + o->x;
-    list->shape[SHAPE_Y][i] = row->b + o->y;
+    const list_outline *o = &m->shape[from].outline;
+    list->shape[SHAPE_X][i] = g->a + o->x;
+    list->shape[SHAPE_Y][i] = g->b + o->y;
     for (int k = 0; k < 3; k++)
         list->shape[SHAPE_CHOL + k][i] = o->chol[k];
     list->shape[SHAPE_ACROSS][i] = m->across[from];
@@ -302,7 +324,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
                       list_scratch *scratch, tile_list *out)
 {
     const size_t begin = view->first[part], count = view->first[part + 1] - begin;
-    const slope_box *box = &view->boxes[part];
+    const slope_box *box = &view->part_boxes[part];
     list_memory m;
     if (!reserve_list(scratch, count, &m))
         return false;
@@ -313,7 +335,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
             __builtin_prefetch(&view->shapes[pair[8].record]);
         }
         m.shape[i] = view->shapes[pair->record];
-        read_row(scene, &view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
+        read_gaussian(scene, &view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
     }
     const size_t n = (count + 15) & ~(size_t)15;
     for (size_t i = count; i < n; i++) { /* repeat one, for whole sixteens */
@@ -329,7 +351,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
         depth_in_tile(&m, i, low, high);
     m.list.any_general = false;
     for (size_t i = 0; i < count; i++)
-        if (m.unsorted[i].pair & ROW_GENERAL) {
+        if (m.unsorted[i].pair & PAIR_GENERAL) {
             m.list.any_general = true;
             depth_of_ellipsoid(scene, part_frame(view, part), middle, &m, i);
         }
@@ -348,11 +370,11 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
     return true;
 }
 
-/* Which of rows first .. first + 15 reach into a packet. Seen from its pixels, the smallest value of an
+/* Which of Gaussians first .. first + 15 reach into a packet. Seen from its pixels, the smallest value of an
    ellipse's form is at its centre, or on the edge nearest to it across or down. */
-static inline unsigned rows_in_packet(const tile_list *list, size_t first, const list_rays *rays)
+static inline unsigned rows_in_packet(const tile_list *list, size_t first, const packet_slopes *slopes)
 {
-    const slope_box *box = &rays->box;
+    const slope_box *box = &slopes->box;
     const float *const *shape = (const float *const *)list->shape;
     const vfloat16 x = vfloat16_load(shape[SHAPE_X] + first), y = vfloat16_load(shape[SHAPE_Y] + first);
     const vfloat16 left = vfloat16_sub(vfloat16_set1(box->low[0]), x),
@@ -379,7 +401,7 @@ static inline unsigned rows_in_packet(const tile_list *list, size_t first, const
     unsigned bits = vmask16_bits(vfloat16_le(vfloat16_min(on_row, on_column), vfloat16_set1(1)));
     for (unsigned rest = list->general[first / 16]; rest != 0; rest &= rest - 1) {
         const int i = __builtin_ctz(rest);
-        if (!ellipsoid_meets_box(&list->ellipsoid[first + (size_t)i], &rays->view_box))
+        if (!ellipsoid_meets_box(&list->ellipsoid[first + (size_t)i], &slopes->face_box))
             bits &= ~(1u << i);
     }
     return first + 16 <= list->count ? bits : bits & 0xFFFFu >> (16 - (list->count - first));

@@ -11,8 +11,8 @@ enum { AHEAD = 12 /* records that are asked for before they are read */ };
 
 /* The Gaussians that a tile has blended. */
 typedef struct used_list {
-    list_row *row;    /* [count] */
-    uint32_t *number; /* [list] place in `row` of those that are used */
+    tile_gaussian *gaussian; /* [count] */
+    uint32_t *number;        /* [list] place in `gaussian` of those that are used */
     size_t count;
 } used_list;
 
@@ -25,7 +25,7 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
         mem_reserve((void **)&scratch->sums, &scratch->sum_capacity, 0, count, sizeof *scratch->sums,
                     "sums of a tile", NULL) != GBT_OK)
         return false;
-    out->row = (list_row *)(void *)scratch->list;
+    out->gaussian = (tile_gaussian *)(void *)scratch->list;
     out->number = (uint32_t *)(void *)(scratch->list + 16 * count);
     uint32_t *pair = out->number + count;
     /* Marked, then numbered: a number for each entry would wait for the counter that the one before stored.
@@ -46,29 +46,32 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
     for (size_t i = 0; i < out->count; i++) {
         if (i + AHEAD < out->count)
             __builtin_prefetch(&view->records[pairs[pair[i + AHEAD]].record]);
-        read_row(scene, &view->records[pairs[pair[i]].record], middle, pair[i], &out->row[i]);
+        read_gaussian(scene, &view->records[pairs[pair[i]].record], middle, pair[i], &out->gaussian[i]);
     }
     return true;
 }
 
 /* Evaluate the rows of a packet again, in the order of the tape, and find T of all of them. */
-static void replay_list(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                        const list_rays *seen, const tape_entry *entry, size_t count, list_rows *out)
+static void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
+                        packet_hits *out)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     out->count = count;
-    const list_rows rows = *out; /* what stores cannot change */
-    const list_row *used_row = used->row;
+    const packet_hits rows = *out; /* what stores cannot change */
+    const tile_gaussian *used_gaussian = used->gaussian;
     const uint32_t *used_number = used->number;
-    const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
-                   length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
+                   length = vfloat16_load(p->slopes.length),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max);
     insertion s = start_insertion(&rows);
     for (size_t first = 0; first < count; first += TOGETHER) {
-        const list_row *g[TOGETHER];
+        const tile_gaussian *g[TOGETHER];
         row_response r[TOGETHER];
         uint32_t number[TOGETHER];
         for (size_t k = 0; k < TOGETHER; k++) {
             number[k] = used_number[entry[first + k < count ? first + k : first].id];
-            g[k] = &used_row[number[k]];
+            g[k] = &used_gaussian[number[k]];
         }
         respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (size_t k = 0; k < TOGETHER && first + k < count; k++) {
@@ -95,7 +98,7 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 }
 
 /* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
-static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *rows, const near_row *now,
+static inline __attribute__((always_inline)) vfloat16 step_on(const packet_hits *rows, const near_row *now,
                                                               vmask16 hit, int j, size_t *steps)
 {
     vfloat16 sum = vfloat16_set1(0);
@@ -114,12 +117,12 @@ static inline __attribute__((always_inline)) vfloat16 step_on(const list_rows *r
    first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
    their nearest hits. Only sums of what has been added, so nothing cancels. False when it takes too many
    steps: `term` and `behind` are then to be found ray by ray. */
-static bool collect_behind(list_rows *out, const used_list *used, const vfloat16 d_rgb[3],
+static bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
                            vfloat16 background)
 {
-    const list_rows copy = *out, *const rows = &copy; /* what stores cannot change */
+    const packet_hits copy = *out, *const rows = &copy; /* what stores cannot change */
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
-    const list_row *used_row = used->row;
+    const tile_gaussian *used_gaussian = used->gaussian;
     const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
     const int count = (int)rows->count;
     near_row next = {infinite, zero, zero, zero}, second = next;
@@ -132,8 +135,8 @@ static bool collect_behind(list_rows *out, const used_list *used, const vfloat16
     for (int i = count; i-- > 0;) {
         const vfloat16 alpha = row_load(rows->alpha, i);
         near_row now = {.t = row_load(rows->t, i), .alpha = zero};
-        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->through, i), alpha),
-                                dot_lanes(used_row[rows->number[i]].color, direction));
+        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), alpha),
+                                dot_lanes(used_gaussian[rows->number[i]].color, direction));
         const vmask16 hit = vfloat16_lt(zero, alpha);
         vfloat16 sum = zero;
         row_store(rows->term, i, now.term);
@@ -159,15 +162,15 @@ static bool collect_behind(list_rows *out, const used_list *used, const vfloat16
 }
 
 /* The same ray by ray. False when memory ran out. */
-static bool collect_behind_by_ray(list_rows *rows, const used_list *used, const vfloat16 d_rgb[3],
+static bool collect_behind_by_ray(packet_hits *rows, const used_list *used, const vfloat16 d_rgb[3],
                                   vfloat16 background, list_scratch *scratch)
 {
     _Alignas(64) float last[PACKET_LANES];
     vfloat16_store(last, background);
     for (int i = 0; i < (int)rows->count; i++) {
         row_store(rows->term, i,
-                  vfloat16_mul(vfloat16_mul(row_load(rows->through, i), row_load(rows->alpha, i)),
-                               dot_lanes(used->row[rows->number[i]].color, d_rgb)));
+                  vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), row_load(rows->alpha, i)),
+                               dot_lanes(used->gaussian[rows->number[i]].color, d_rgb)));
         row_store(rows->behind, i, vfloat16_set1(0)); /* rays without a hit in it read it, too */
     }
     for (int lane = 0; lane < PACKET_LANES; lane++) {
@@ -187,7 +190,7 @@ static bool collect_behind_by_ray(list_rows *rows, const used_list *used, const 
 
 /* h = dL/d(d2) of a row, and the weight T alpha. alpha = min(alpha_max, o G): from the cap on nothing but
    the colour has a gradient. */
-static inline void row_gradients(const list_rows *rows, int i, vfloat16 alpha_max, vfloat16 *h,
+static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_max, vfloat16 *h,
                                  vfloat16 *weight)
 {
     const vfloat16 alpha = row_load(rows->alpha, i),
@@ -195,7 +198,7 @@ static inline void row_gradients(const list_rows *rows, int i, vfloat16 alpha_ma
     const vfloat16 d_log = vfloat16_fnma(share, row_load(rows->behind, i), row_load(rows->term, i));
     *h = vfloat16_select(vfloat16_lt(alpha, alpha_max), vfloat16_mul(vfloat16_set1(-0.5f), d_log),
                          vfloat16_set1(0));
-    *weight = vfloat16_mul(row_load(rows->through, i), alpha);
+    *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
 /* The sums of a row over the rays, to those of its Gaussian. */
@@ -235,21 +238,22 @@ static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint
 
 /* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
    (turn_sums). */
-static void sum_rows(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                     const list_rays *seen, const vfloat16 direction[3], const list_rows *from,
-                     gradient_slot *sums)
+static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
+                     const packet_hits *from, gradient_slot *sums)
 {
-    const list_rows copy = *from, *const rows = &copy; /* what stores cannot change */
-    const list_row *used_row = used->row;
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(seen->a),
-                   b = vfloat16_load(seen->b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
+    const packet_hits copy = *from, *const rows = &copy; /* what stores cannot change */
+    const tile_gaussian *used_gaussian = used->gaussian;
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
+                   b = vfloat16_load(p->slopes.b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
                    d_rgb[3] = {direction[0], direction[1], direction[2]};
     for (int first = 0; first < (int)rows->count; first += TOGETHER) {
-        const list_row *g[TOGETHER];
+        const tile_gaussian *g[TOGETHER];
         vfloat16 h[TOGETHER], weight[TOGETHER], v[TOGETHER][3];
         for (int k = 0; k < TOGETHER; k++) {
             const int i = first + k < (int)rows->count ? first + k : first;
-            g[k] = &used_row[rows->number[i]];
+            g[k] = &used_gaussian[rows->number[i]];
             row_gradients(rows, i, alpha_max, &h[k], &weight[k]);
         }
         for (int k = 0; k < TOGETHER; k++) {
@@ -268,7 +272,7 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
         }
         for (int k = 0; k < TOGETHER && first + k < (int)rows->count; k++) {
             float *to = sums[rows->number[first + k]].sum;
-            if (g[k]->pair & ROW_GENERAL)
+            if (g[k]->pair & PAIR_GENERAL)
                 sum_general(scene, rays, g[k]->id, vfloat16_lt(zero, row_load(rows->alpha, first + k)), h[k],
                             weight[k], d_rgb, to);
             else
@@ -277,28 +281,30 @@ static void sum_rows(const kernel_scene *scene, const used_list *used, const pac
     }
 }
 
-/* The whole adjoint where the rays have one order, from the last row to the first. `through` is T behind all
-   rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background. */
-static void sum_in_order(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                         const list_rays *seen, const tape_entry *entry, size_t count, vfloat16 through,
-                         vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
+/* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
+   all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
+ */
+static void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
+                         vfloat16 T, vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
 {
-    const list_row *used_row = used->row;
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
+    const tile_gaussian *used_gaussian = used->gaussian;
     const uint32_t *used_number = used->number;
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(seen->a),
-                   b = vfloat16_load(seen->b), length = vfloat16_load(seen->length),
+    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
+                   b = vfloat16_load(p->slopes.b), length = vfloat16_load(p->slopes.length),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max),
                    d_rgb[3] = {direction[0], direction[1], direction[2]};
     for (size_t done = 0; done < count; done += TOGETHER) {
         const size_t left = count - done;
-        const list_row *g[TOGETHER];
+        const tile_gaussian *g[TOGETHER];
         row_response r[TOGETHER];
         vfloat16 alpha[TOGETHER], clear[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
             v[TOGETHER][3];
         uint32_t number[TOGETHER];
         for (size_t k = 0; k < TOGETHER; k++) {
             number[k] = used_number[entry[k < left ? left - 1 - k : 0].id];
-            g[k] = &used_row[number[k]];
+            g[k] = &used_gaussian[number[k]];
         }
         respond_rows(scene, rays, g, a, b, length, r, v);
         for (size_t k = 0; k < TOGETHER; k++) {
@@ -309,8 +315,8 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
         }
         for (size_t k = 0; k < TOGETHER; k++) { /* the cap: see row_gradients() */
             const vfloat16 color = dot_lanes(g[k]->color, d_rgb);
-            through = vfloat16_mul(through, inverse[k]);
-            weight[k] = vfloat16_mul(through, alpha[k]);
+            T = vfloat16_mul(T, inverse[k]);
+            weight[k] = vfloat16_mul(T, alpha[k]);
             const vfloat16 d_log = vfloat16_mul(weight[k], vfloat16_sub(color, behind));
             h[k] = vfloat16_select(vfloat16_lt(alpha[k], alpha_max),
                                    vfloat16_mul(vfloat16_set1(-0.5f), d_log), zero);
@@ -318,7 +324,7 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
         }
         for (size_t k = 0; k < TOGETHER && k < left; k++) {
             float *to = sums[number[k]].sum;
-            if (g[k]->pair & ROW_GENERAL)
+            if (g[k]->pair & PAIR_GENERAL)
                 sum_general(scene, rays, g[k]->id, vfloat16_lt(zero, alpha[k]), h[k], weight[k], d_rgb, to);
             else
                 add_sums(h[k], weight[k], v[k], d_rgb, to);
@@ -326,31 +332,29 @@ static void sum_in_order(const kernel_scene *scene, const used_list *used, const
     }
 }
 
-static bool adjoint_of_packet(const kernel_scene *scene, const used_list *used, const packet_rays *rays,
-                              const list_rays *seen, const hit_tape *tape, size_t from, size_t count,
-                              int packet, float d_rgb_in[3][PACKET_LANES], list_rows *rows,
+static bool adjoint_of_packet(const packet_pass *p, const used_list *used, const hit_tape *tape, size_t from,
+                              size_t count, float d_rgb_in[3][PACKET_LANES], packet_hits *rows,
                               list_scratch *scratch)
 {
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
-        behind_all[c] = vfloat16_load(rays->background[c]);
+        behind_all[c] = vfloat16_load(p->rays->background[c]);
     }
     const tape_entry *entry = tape->entries + from;
-    if (scene->settings.packet_order) {
-        sum_in_order(scene, used, rays, seen, entry, count,
-                     vfloat16_load(tape->through + packet * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
-                     scratch->sums);
+    if (p->scene->settings.packet_order) {
+        sum_in_order(p, used, entry, count, vfloat16_load(tape->T_left + p->number * PACKET_LANES),
+                     dot16(behind_all, d_rgb), d_rgb, scratch->sums);
         return true;
     }
-    replay_list(scene, used, rays, seen, entry, count, rows);
+    replay_list(p, used, entry, count, rows);
     if (rows->crowded && !sort_rows_by_ray(rows, scratch))
         return false;
     const vfloat16 background = vfloat16_mul(dot16(behind_all, d_rgb), rows->product);
     if ((rows->crowded || !collect_behind(rows, used, d_rgb, background)) &&
         !collect_behind_by_ray(rows, used, d_rgb, background, scratch))
         return false;
-    sum_rows(scene, used, rays, seen, d_rgb, rows, scratch->sums);
+    sum_rows(p, used, d_rgb, rows, scratch->sums);
     return true;
 }
 
@@ -361,22 +365,21 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
     const size_t begin = view->first[part], pairs = view->first[part + 1] - begin;
     double middle[2];
     used_list used;
-    list_rows rows;
-    tile_middle(&view->boxes[part], middle);
+    packet_hits rows;
+    tile_middle(&view->part_boxes[part], middle);
     if (!load_used(scene, view, part, middle, tape, scratch, &used) ||
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;
-    for (int p = 0; p < TILE_PACKETS; p++) {
+    for (int i = 0; i < TILE_PACKETS; i++) {
         const size_t from = at;
-        list_rays seen;
-        if (rays->packet[p].active == 0)
+        packet_pass pass;
+        if (rays->packet[i].active == 0)
             continue;
-        while (at < tape->count && tape->entries[at].packet == p)
+        while (at < tape->count && tape->entries[at].packet == i)
             at++;
-        slope_rays(part_frame(view, part), &rays->packet[p], middle, &seen);
-        if (!adjoint_of_packet(scene, &used, &rays->packet[p], &seen, tape, from, at - from, p, d_rgb[p],
-                               &rows, scratch))
+        start_pass(scene, part_frame(view, part), rays, i, middle, &pass);
+        if (!adjoint_of_packet(&pass, &used, tape, from, at - from, d_rgb[i], &rows, scratch))
             return false;
     }
     for (size_t i = 0; i < pairs; i++) {
@@ -407,7 +410,7 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
 }
 
 /* From the turned axes of a face to the Gaussians' own. */
-static void turn_sums(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
+static void turn_sums(const kernel_scene *scene, const list_view *view, const list_face *face, size_t begin,
                       size_t end, block_sums *out)
 {
     for (size_t first = begin; first < end; first += 16) {
@@ -421,7 +424,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const vi
         view_form form;
         gather_slots(view, first, end, by_record);
         for (size_t i = 0; i < 16; i++) {
-            const view_record *r = &view->records[first + i < end ? first + i : first];
+            const list_record *r = &view->records[first + i < end ? first + i : first];
             rows[i] = by_record[i];
             id[i] = record_id(r);
             general |= (unsigned)record_is_general(r) << i;

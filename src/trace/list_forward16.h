@@ -14,108 +14,113 @@ typedef struct row_queue {
 } row_queue;
 
 /* What the rays of a packet still see. */
-typedef struct packet_sight {
+typedef struct ray_limits {
     vfloat16 far;  /* hits at this depth or behind are not seen */
     vfloat16 near; /* of parts of rays: nor are hits nearer than this */
     bool parts;
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
-} packet_sight;
+} ray_limits;
 
 /* One row more, when it has a hit. */
-static inline void append_response(const list_rows *rows, size_t *count, const list_row *g, uint32_t number,
-                                   row_response r, vfloat16 alpha_max, packet_sight *sight)
+static inline void append_response(const packet_hits *rows, size_t *count, const tile_gaussian *g,
+                                   uint32_t number, row_response r, vfloat16 alpha_max, ray_limits *limits)
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
-    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, sight->far));
-    if (sight->parts)
-        hit = vmask16_and(hit, vfloat16_le(sight->near, r.t));
+    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, limits->far));
+    if (limits->parts)
+        hit = vmask16_and(hit, vfloat16_le(limits->near, r.t));
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
-    sight->product = vfloat16_fnma(sight->product, alpha, sight->product);
-    sight->reached = vfloat16_max(sight->reached, vfloat16_select(hit, r.t, zero));
+    limits->product = vfloat16_fnma(limits->product, alpha, limits->product);
+    limits->reached = vfloat16_max(limits->reached, vfloat16_select(hit, r.t, zero));
     rows->number[at] = number;
     *count += vmask16_any(hit) != 0;
 }
 
-/* `seen_by` and the rows are copied, so that compilers know what stores cannot change. */
-static void evaluate_queue(const kernel_scene *scene, const tile_list *list, const packet_rays *rays,
-                           const list_rays *seen, const row_queue *queue, unsigned take, list_rows *out,
-                           packet_sight *seen_by)
+/* `limits`, the rows and pointers are copied, so that compilers know what stores cannot change. */
+static void evaluate_queue(const packet_pass *p, const tile_list *list, const row_queue *queue, unsigned take,
+                           packet_hits *out, ray_limits *limits)
 {
-    const vfloat16 a = vfloat16_load(seen->a), b = vfloat16_load(seen->b),
-                   length = vfloat16_load(seen->length), alpha_max = vfloat16_set1(scene->settings.alpha_max);
-    const list_rows rows = *out;
-    const list_row *row = list->row;
-    packet_sight sight = *seen_by;
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
+    const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
+                   length = vfloat16_load(p->slopes.length),
+                   alpha_max = vfloat16_set1(scene->settings.alpha_max);
+    const packet_hits rows = *out;
+    const tile_gaussian *gaussian = list->gaussian;
+    ray_limits now = *limits;
     size_t count = rows.count;
     for (unsigned first = 0; first < take; first += TOGETHER) {
-        const list_row *g[TOGETHER];
+        const tile_gaussian *g[TOGETHER];
         row_response r[TOGETHER];
         for (unsigned k = 0; k < TOGETHER; k++)
-            g[k] = &row[queue->number[first + k < take ? first + k : take - 1]];
+            g[k] = &gaussian[queue->number[first + k < take ? first + k : take - 1]];
         respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (unsigned k = 0; k < TOGETHER && first + k < take; k++)
-            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &sight);
+            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &now);
     }
     out->count = count;
-    *seen_by = sight;
+    *limits = now;
 }
 
 /* All rows that can be seen. */
-static void gather_rows(const kernel_scene *scene, const tile_list *list, const packet_rays *rays, bool parts,
-                        const list_rays *seen, list_rows *rows, kernel_counters *counters)
+static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
+                        kernel_counters *counters)
 {
-    const vfloat16 opaque = vfloat16_set1(0.9999f * scene->settings.transmittance_min),
-                   length = vfloat16_mul(vfloat16_load(seen->length), vfloat16_set1(0.99999f)),
+    const packet_rays *rays = p->rays;
+    const bool parts = p->parts;
+    const vfloat16 opaque = vfloat16_set1(0.9999f * p->scene->settings.transmittance_min),
+                   length = vfloat16_mul(vfloat16_load(p->slopes.length), vfloat16_set1(0.99999f)),
                    zero = vfloat16_set1(0);
     /* Rays that are not active see nothing. */
-    packet_sight sight = {
-        .far = vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
-        .near = parts ? vfloat16_load(rays->near) : zero,
-        .parts = parts,
-        .product = parts ? vfloat16_load(rays->through) : vfloat16_set1(1),
-        .reached = zero};
+    ray_limits limits = {.far =
+                             vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
+                         .near = parts ? vfloat16_load(rays->near) : zero,
+                         .parts = parts,
+                         .product = parts ? vfloat16_load(rays->T_front) : vfloat16_set1(1),
+                         .reached = zero};
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
-        const unsigned bits = rows_in_packet(list, first, seen);
+        const unsigned bits = rows_in_packet(list, first, &p->slopes);
         queue.count += vmask16_numbers(vmask16_from_bits(bits), (uint32_t)first, queue.number + queue.count);
         const bool last = first + 16 >= list->count;
         if (queue.count < 16 && !last)
             continue;
         const unsigned take = last ? queue.count : 16;
-        evaluate_queue(scene, list, rays, seen, &queue, take, rows, &sight);
+        evaluate_queue(p, list, &queue, take, rows, &limits);
         counters->tests += (uint64_t)take * PACKET_LANES;
         queue.count -= take;
         memcpy(queue.number, queue.number + 16, 16 * sizeof *queue.number);
-        /* What lies behind all hits of a ray that is opaque is not seen, and left out also with packet_order,
-           which may put it in front of them; at their depth, which is 0 where they are cut there, it still
-           may be. */
+        /* Hits behind an opaque ray's last hit are skipped, also with packet_order, which may put them in
+           front of it; hits at its very depth, which may be 0, are not. */
         const vfloat16 behind =
-            vfloat16_max(vfloat16_mul(sight.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
-        sight.far =
-            vfloat16_select(vfloat16_lt(sight.product, opaque), vfloat16_min(sight.far, behind), sight.far);
+            vfloat16_max(vfloat16_mul(limits.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
+        limits.far = vfloat16_select(vfloat16_lt(limits.product, opaque), vfloat16_min(limits.far, behind),
+                                     limits.far);
         /* Those that still wait are of this sixteen. */
         const float nearest = list->nearest[first / 16 + (queue.count == 0)];
-        if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), sight.far)))
+        if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), limits.far)))
             break;
     }
 }
 
-static bool blend_list(const kernel_scene *scene, const tile_list *list, const list_rows *from,
-                       const packet_rays *rays, bool parts, int packet, packet_output *out, hit_tape *tape,
-                       kernel_counters *counters)
+static bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
+                       packet_output *out, hit_tape *tape, kernel_counters *counters)
 {
+    const kernel_scene *scene = p->scene;
+    const packet_rays *rays = p->rays;
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
-    const vfloat16 start = parts ? vfloat16_load(rays->through) : one;
+    const vfloat16 start = p->parts ? vfloat16_load(rays->T_front) : one;
     const bool one_order = scene->settings.packet_order;
+    const uint16_t packet = (uint16_t)p->number;
     vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
              rgb[3] = {zero, zero, zero};
-    const list_rows copy = *from, *rows = &copy;
+    const packet_hits copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
     size_t kept = tape != NULL ? tape->count : 0;
     packet_extra extra;
@@ -128,12 +133,12 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
     tape_entry *entries = tape != NULL ? tape->entries : NULL;
     for (size_t i = 0; i < rows->count; i++) {
         const int row = (int)rows->order[i];
-        const vfloat16 through = one_order ? product : row_load(rows->through, (int)i),
-                       T = vfloat16_mul(start, through), alpha = row_load(rows->alpha, row),
+        const vfloat16 T_front = one_order ? product : row_load(rows->T_front, (int)i),
+                       T = vfloat16_mul(start, T_front), alpha = row_load(rows->alpha, row),
                        next = vfloat16_fnma(T, alpha, T);
         const vmask16 hit = vfloat16_lt(zero, alpha), blend = vmask16_and(hit, vfloat16_le(stop_at, next));
         const vfloat16 weight = vfloat16_select(blend, vfloat16_mul(T, alpha), zero);
-        const list_row *g = &list->row[rows->number[row]];
+        const tile_gaussian *g = &list->gaussian[rows->number[row]];
         const unsigned bits = vmask16_bits(blend);
         product = vfloat16_fnma(product, alpha, product);
         lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
@@ -145,14 +150,14 @@ static bool blend_list(const kernel_scene *scene, const tile_list *list, const l
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
-            entries[kept] = (tape_entry){g->pair & ~ROW_GENERAL, (uint16_t)bits, (uint16_t)packet};
+            entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
             kept += bits != 0;
         }
     }
     if (tape != NULL)
         tape->count = kept;
     if (tape != NULL && one_order)
-        vfloat16_store(tape->through + packet * PACKET_LANES, lowest);
+        vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
@@ -173,29 +178,28 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
 {
     double middle[2];
     tile_list list;
-    list_rows rows;
-    tile_middle(&view->boxes[part], middle);
+    packet_hits rows;
+    tile_middle(&view->part_boxes[part], middle);
     if (!load_list(scene, view, part, middle, scratch, &list) ||
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;
     if (tape != NULL && scene->settings.packet_order &&
-        mem_reserve((void **)&tape->through, &tape->through_capacity, 0, TILE_PACKETS * PACKET_LANES,
-                    sizeof *tape->through, "hit tape", NULL) != GBT_OK)
+        mem_reserve((void **)&tape->T_left, &tape->T_left_capacity, 0, TILE_PACKETS * PACKET_LANES,
+                    sizeof *tape->T_left, "hit tape", NULL) != GBT_OK)
         return false;
     counters->candidates += (uint64_t)list.count;
-    for (int p = 0; p < TILE_PACKETS; p++) {
-        const packet_rays *packet = &rays->packet[p];
-        list_rays seen;
-        if (packet->active == 0)
+    for (int i = 0; i < TILE_PACKETS; i++) {
+        packet_pass pass;
+        if (rays->packet[i].active == 0)
             continue;
-        counters->rays += (uint64_t)__builtin_popcount(packet->active);
-        slope_rays(part_frame(view, part), packet, middle, &seen);
-        gather_rows(scene, &list, packet, rays->parts, &seen, &rows, counters);
+        counters->rays += (uint64_t)__builtin_popcount(rays->packet[i].active);
+        start_pass(scene, part_frame(view, part), rays, i, middle, &pass);
+        gather_rows(&pass, &list, &rows, counters);
         order_by_middle(scene, &list, &rows);
         if (!scene->settings.packet_order)
             insert_rows(&rows);
         if ((rows.crowded && !sort_rows_by_ray(&rows, scratch)) ||
-            !blend_list(scene, &list, &rows, packet, rays->parts, p, &out[p], tape, counters))
+            !blend_list(&pass, &list, &rows, &out[i], tape, counters))
             return false;
     }
     return true;

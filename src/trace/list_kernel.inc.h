@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/list_kernel.inc.h -- rays from one point, tile by tile over lists. Compiled once per instruction set.
 
-     Gaussians --> records in a face's axes (view_records16.h) --> parts that each may be hit in
-         (list_parts16.h) --> lists of the parts (view_lists.c)
+     Gaussians --> records in a face's axes (list_records16.h) --> parts that each may be hit in
+         (list_parts16.h) --> lists of the parts (list_build.c)
      list of a part, in the order of depth (list16.h)
          --> every packet: the rows that reach into it, evaluated, put in each ray's order (list_rows16.h),
              blended (list_forward16.h)

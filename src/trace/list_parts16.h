@@ -5,14 +5,14 @@
 #define GBT_TRACE_LIST_PARTS16_H
 
 #include "trace/list_view.h"
-#include "trace/view_records16.h"
+#include "trace/list_records16.h"
 
 /* Sixteen boxes of slopes as seen from the middle of an ellipse. */
 typedef struct boxes_about {
     vfloat16 left, right, bottom, top;
 } boxes_about;
 
-static inline boxes_about boxes_from(const part_boxes *boxes, float x, float y)
+static inline boxes_about boxes_from(const box_lanes *boxes, float x, float y)
 {
     const vfloat16 middle_x = vfloat16_set1(x), middle_y = vfloat16_set1(y);
     return (boxes_about){vfloat16_sub(vfloat16_load(boxes->edge[0]), middle_x),
@@ -59,27 +59,27 @@ static inline vmask16 ellipse_meets(const boxes_about *b, const float c[3])
                        vfloat16_set1(1));
 }
 
-static size_t find_parts(const list_view *view, const view_face *face, size_t record, uint32_t *parts)
+static size_t find_parts(const list_view *view, const list_face *face, size_t record, uint32_t *parts)
 {
-    const view_record *r = &view->records[record];
-    const view_shape *shape = &view->shapes[record];
+    const list_record *r = &view->records[record];
+    const list_shape *shape = &view->shapes[record];
     size_t count = 0;
     if (record_is_general(r)) {
         for (size_t i = face->first_part; i < face->first_part + face->part_count; i++) {
-            const slope_box *box = &view->boxes[i];
+            const slope_box *box = &view->part_boxes[i];
             parts[count] = (uint32_t)i;
             count += view->parts[i].sees && box->low[0] <= box->high[0] &&
                      ellipsoid_meets_box(&shape->ellipsoid, box);
         }
         return count;
     }
-    const view_outline *o = &shape->outline;
+    const list_outline *o = &shape->outline;
     const float x = (float)(r->a + (double)o->x), y = (float)(r->b + (double)o->y);
-    for (size_t i = 0; i < face->groups; i++) {
-        const boxes_about around = boxes_from(&view->group[face->first_group + i], x, y);
+    for (size_t i = 0; i < face->box256_count; i++) {
+        const boxes_about around = boxes_from(&view->boxes256[face->first_box256 + i], x, y);
         for (unsigned rest = vmask16_bits(boxes_meet(&around, o->half)); rest != 0; rest &= rest - 1) {
             const size_t at = 16 * i + (size_t)__builtin_ctz(rest);
-            const boxes_about boxes = boxes_from(&view->fine[face->first_boxes + at], x, y);
+            const boxes_about boxes = boxes_from(&view->boxes16[face->first_box16 + at], x, y);
             const vmask16 near = boxes_meet(&boxes, o->half);
             if (vmask16_any(near))
                 count += vmask16_numbers(vmask16_and(near, ellipse_meets(&boxes, o->chol)),

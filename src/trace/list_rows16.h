@@ -13,17 +13,17 @@
 
 #include "trace/list16.h"
 #include "trace/ray_hits.h"
-#include "trace/rows16.h"
+#include "trace/row16.h"
 
 /* Steps back, or on, that a packet is allowed per row before its rays are sorted one by one. */
 enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };
 
-/* Arrays of rows, PACKET_LANES floats each; sixteen more than `count` have memory. */
-typedef struct list_rows {
+/* The hits of a packet: arrays of rows, PACKET_LANES floats each; sixteen more than `count` have memory. */
+typedef struct packet_hits {
     float *t;     /* depth, hit or not */
     float *alpha; /* 0 where the ray has no hit in this row */
     /* By place in the order: */
-    float *through; /* T in front of the hit; two more stand before the first */
+    float *T_front; /* T in front of the hit, from 1 on; two more stand before the first */
     float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
     float *reached; /* farthest hit of all rows before this one; two more, too */
     /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
@@ -35,22 +35,22 @@ typedef struct list_rows {
     size_t count;
     size_t steps;     /* of the last pass over them */
     vfloat16 product; /* of 1 - alpha over all rows */
-    bool crowded;     /* too many steps: `through` is found by sorting */
-} list_rows;
+    bool crowded;     /* too many steps: `T_front` is found by sorting */
+} packet_hits;
 
-static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, list_rows *out)
+static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, packet_hits *out)
 {
     /* Arrays 4096 bytes apart would compete for the same lines of the cache. */
     const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 8 : 5;
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 3 * (n + 9),
                     sizeof(float), "rows of a packet", NULL) != GBT_OK)
         return false;
-    float **field[8] = {&out->t,       &out->alpha, &out->through, &out->before,
+    float **field[8] = {&out->t,       &out->alpha, &out->T_front, &out->before,
                         &out->reached, &out->term,  &out->behind,  &out->inverse};
     float *at = scratch->rows;
     for (size_t k = 0; k < arrays; k++, at += wide)
         *field[k] = at;
-    out->through += 2 * PACKET_LANES;
+    out->T_front += 2 * PACKET_LANES;
     out->before += 2 * PACKET_LANES;
     out->reached += 2 * PACKET_LANES;
     out->key = at;
@@ -72,7 +72,7 @@ typedef struct row_response {
 enum { TOGETHER = 4 };
 
 /* `v`: NULL, or what sum_rows() finds of each row. */
-static inline __attribute__((always_inline)) void respond_together(const list_row *const g[TOGETHER],
+static inline __attribute__((always_inline)) void respond_together(const tile_gaussian *const g[TOGETHER],
                                                                    vfloat16 a, vfloat16 b, vfloat16 length,
                                                                    row_response out[TOGETHER],
                                                                    vfloat16 (*v)[3])
@@ -93,7 +93,7 @@ static inline __attribute__((always_inline)) void respond_together(const list_ro
     for (int k = 0; k < TOGETHER; k++) {
         exponent[k] =
             vfloat16_max(vfloat16_mul(vfloat16_set1(-g[k]->falloff), vfloat16_mul(y[k], out[k].inverse)),
-                         vfloat16_set1(-120.0f));
+                         vfloat16_set1(EXP2_LEAST));
         out[k].t = vfloat16_mul(vfloat16_mul(length, vfloat16_set1(g[k]->depth)),
                                 vfloat16_mul(w1[k], out[k].inverse));
     }
@@ -119,32 +119,32 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
 
 /* respond_together(), by the general form where the other does not hold. */
 static inline __attribute__((always_inline)) void respond_rows(
-    const kernel_scene *scene, const packet_rays *rays, const list_row *const g[TOGETHER], vfloat16 a,
+    const kernel_scene *scene, const packet_rays *rays, const tile_gaussian *const g[TOGETHER], vfloat16 a,
     vfloat16 b, vfloat16 length, row_response r[TOGETHER], vfloat16 v[TOGETHER][3])
 {
     uint32_t pairs = 0;
     respond_together(g, a, b, length, r, v);
     for (int k = 0; k < TOGETHER; k++)
         pairs |= g[k]->pair;
-    if (pairs & ROW_GENERAL)
+    if (pairs & PAIR_GENERAL)
         for (int k = 0; k < TOGETHER; k++)
-            if (g[k]->pair & ROW_GENERAL)
+            if (g[k]->pair & PAIR_GENERAL)
                 r[k] = respond_general(scene, rays, g[k]->id);
 }
 
-static inline const list_row *row_at(const tile_list *list, const list_rows *rows, size_t place)
+static inline const tile_gaussian *gaussian_at(const tile_list *list, const packet_hits *rows, size_t place)
 {
-    return &list->row[rows->number[rows->order[place]]];
+    return &list->gaussian[rows->number[rows->order[place]]];
 }
 
 /* `count` rows from place `first` on, by index. Sorted in arrays that are not yet set. */
-static void order_by_index(const tile_list *list, list_rows *rows, size_t first, size_t count)
+static void order_by_index(const tile_list *list, packet_hits *rows, size_t first, size_t count)
 {
-    uint32_t *sorted = (uint32_t *)(void *)(rows->through + count);
+    uint32_t *sorted = (uint32_t *)(void *)(rows->T_front + count);
     for (size_t i = 0; i < count; i++)
-        memcpy(&rows->through[i], &row_at(list, rows, first + i)->id, sizeof(uint32_t));
+        memcpy(&rows->T_front[i], &gaussian_at(list, rows, first + i)->id, sizeof(uint32_t));
     const uint64_t *order =
-        sort_list(rows->through, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
+        sort_list(rows->T_front, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
     for (size_t i = 0; i < count; i++)
         sorted[i] = rows->order[first + (uint32_t)order[i]];
     memcpy(rows->order + first, sorted, count * sizeof *sorted);
@@ -152,7 +152,7 @@ static void order_by_index(const tile_list *list, list_rows *rows, size_t first,
 
 /* Rows that are cut at the near depth on some ray come first, by index, which is how their hits at that very
    depth are ordered. Their keys are 0. */
-static void order_cut_rows(const tile_list *list, list_rows *rows)
+static void order_cut_rows(const tile_list *list, packet_hits *rows)
 {
     size_t cut = 0;
     while (cut < rows->count && rows->key[rows->order[cut]] == 0)
@@ -160,15 +160,14 @@ static void order_cut_rows(const tile_list *list, list_rows *rows)
     order_by_index(list, rows, 0, cut);
 }
 
-/* Gaussians in one place that are at one depth on one ray, as copies of other sizes and opacities are, may be
-   so on all: by index. */
-static void order_copies(const kernel_scene *scene, const tile_list *list, list_rows *rows)
+/* Copies of one Gaussian may have equal depths on every ray: order them by index. */
+static void order_copies(const kernel_scene *scene, const tile_list *list, packet_hits *rows)
 {
     for (size_t first = 0, end; first < rows->count; first = end) {
         const float key = rows->key[rows->order[first]];
         for (end = first + 1; end < rows->count && rows->key[rows->order[end]] == key; end++) {
-            const float *a = scene->records + (size_t)row_at(list, rows, first)->id * RECORD_FLOATS,
-                        *b = scene->records + (size_t)row_at(list, rows, end)->id * RECORD_FLOATS;
+            const float *a = scene->records + (size_t)gaussian_at(list, rows, first)->id * RECORD_FLOATS,
+                        *b = scene->records + (size_t)gaussian_at(list, rows, end)->id * RECORD_FLOATS;
             if (memcmp(a + RECORD_MEAN, b + RECORD_MEAN, 3 * sizeof *a) != 0)
                 break;
         }
@@ -182,7 +181,7 @@ enum { MIDDLE = PACKET_PIXELS + 1 };
 /* The depth of a row for one order of all rays (trace_settings.packet_order). A plane seen from its edge may
    be anywhere on a ray beside it, also behind its start: where the middle ray has no hit, the next one that
    has says about how far it is. */
-static inline float packet_depth(const list_rows *rows, size_t i, float t_near)
+static inline float packet_depth(const packet_hits *rows, size_t i, float t_near)
 {
     const float *t = rows->t + i * PACKET_LANES;
     const unsigned hit = vmask16_bits(vfloat16_lt(vfloat16_set1(0), row_load(rows->alpha, (int)i)));
@@ -194,7 +193,7 @@ static inline float packet_depth(const list_rows *rows, size_t i, float t_near)
 /* The rows in the order of their depth on a ray in the middle; those of the same depth, in that of the tile's
    list. Where two floats happen to be equal on one ray, this order decides: it knows more than they do.
    A depth may be negative where there is no hit; keys are not, so that rows that are cut come first. */
-static void order_by_middle(const kernel_scene *scene, const tile_list *list, list_rows *rows)
+static void order_by_middle(const kernel_scene *scene, const tile_list *list, packet_hits *rows)
 {
     const size_t count = rows->count;
     bool cut = false;
@@ -239,7 +238,7 @@ static inline void pass_row(const near_row *now, near_row *other, vfloat16 *prod
 }
 
 /* Row i goes back past those before j, too; returned is its T. */
-static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows *rows, const near_row *now,
+static inline __attribute__((always_inline)) vfloat16 step_back(const packet_hits *rows, const near_row *now,
                                                                 vmask16 hit, int j, size_t *steps)
 {
     const vfloat16 t = now->t, alpha = now->alpha;
@@ -248,7 +247,7 @@ static inline __attribute__((always_inline)) vfloat16 step_back(const list_rows 
     do {
         const int other = (int)rows->order[--j];
         const vmask16 front = vfloat16_lt(t, row_load(rows->t, other));
-        row_store(rows->through, j, vfloat16_less_where(front, row_load(rows->through, j), alpha));
+        row_store(rows->T_front, j, vfloat16_less_where(front, row_load(rows->T_front, j), alpha));
         product = vfloat16_less_unless(front, product, row_load(rows->alpha, other));
     } while (vmask16_any(vmask16_and(vfloat16_lt(t, row_load(rows->reached, j)), hit)));
     *steps += (size_t)(from - j);
@@ -264,7 +263,7 @@ typedef struct insertion {
     bool crowded;
 } insertion;
 
-static inline insertion start_insertion(const list_rows *rows)
+static inline insertion start_insertion(const packet_hits *rows)
 {
     const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
     const near_row none = {zero, zero, zero, one};
@@ -278,7 +277,7 @@ static inline insertion start_insertion(const list_rows *rows)
 /* Row i of the order: T in front of its hits, and in front of those that they hide. Each goes back past the
    last two without asking, because a branch that cannot be foretold costs more. `rows` is a copy of `out`,
    so that compilers know what stores cannot change. */
-static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
+static inline void insert_row(const packet_hits *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
 {
     const vfloat16 zero = vfloat16_set1(0);
     near_row now = {.t = t, .alpha = alpha, .term = zero};
@@ -293,26 +292,26 @@ static inline void insert_row(const list_rows *rows, insertion *s, int i, vfloat
         now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
         s->crowded = s->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
     }
-    row_store(rows->through, i - 2, s->second.value);
+    row_store(rows->T_front, i - 2, s->second.value);
     s->second = s->last;
     s->last = now;
     s->before = vfloat16_fnma(s->before, alpha, s->before);
     s->reached = vfloat16_max(s->reached, vfloat16_select(hit, now.t, zero));
 }
 
-static inline void end_insertion(list_rows *out, const insertion *s)
+static inline void end_insertion(packet_hits *out, const insertion *s)
 {
     const int end = (int)out->count;
-    row_store(out->through, end - 2, s->second.value);
-    row_store(out->through, end - 1, s->last.value);
+    row_store(out->T_front, end - 2, s->second.value);
+    row_store(out->T_front, end - 1, s->last.value);
     out->product = s->before;
     out->steps = s->steps;
     out->crowded = s->crowded;
 }
 
-static void insert_rows(list_rows *out)
+static void insert_rows(packet_hits *out)
 {
-    const list_rows rows = *out;
+    const packet_hits rows = *out;
     insertion s = start_insertion(&rows);
     for (int i = 0; i < (int)rows.count; i++) {
         const int row = (int)rows.order[i];
@@ -322,7 +321,7 @@ static void insert_rows(list_rows *out)
 }
 
 /* The hits of one ray in their order, in scratch, each with its place; NULL when memory ran out. */
-static const ray_hit *sort_lane(const list_rows *rows, int lane, list_scratch *scratch, size_t *count)
+static const ray_hit *sort_lane(const packet_hits *rows, int lane, list_scratch *scratch, size_t *count)
 {
     if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, 2 * rows->count * sizeof(ray_hit), 1,
                     "hits of a ray", NULL) != GBT_OK)
@@ -342,7 +341,7 @@ static const ray_hit *sort_lane(const list_rows *rows, int lane, list_scratch *s
 }
 
 /* T of all hits, ray by ray. False when memory ran out. */
-static bool sort_rows_by_ray(list_rows *rows, list_scratch *scratch)
+static bool sort_rows_by_ray(packet_hits *rows, list_scratch *scratch)
 {
     for (int lane = 0; lane < PACKET_LANES; lane++) {
         size_t count;
@@ -351,7 +350,7 @@ static bool sort_rows_by_ray(list_rows *rows, list_scratch *scratch)
             return false;
         float T = 1;
         for (size_t k = 0; k < count; k++) {
-            rows->through[(size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane] = T;
+            rows->T_front[(size_t)(uint32_t)hits[k].key * PACKET_LANES + (size_t)lane] = T;
             T *= 1 - hits[k].alpha;
         }
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/list_view.h -- one view of Gaussians from the point where all its rays start: records in the axes of
-   its faces, and the list of each tile. What view_faces.c and view_lists.c make and the list kernels read.
+   its faces, and the list of each tile. What list_faces.c and list_build.c make and the kernels of
+   list_kernel.h read.
 
    In the axes u, v, w of a face a ray is s (a, b, 1): a and b are its slopes. Rays that look into one half
    space have one face; others the six of a cube. */
@@ -12,22 +13,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/cpu.h"
-#include "base/gaussians.h"
 #include "trace/kernel.h"
 
 enum {
-    VIEW_GRAIN = 512, /* Gaussians whose records are made together; a multiple of 16 */
-    VIEW_FACES = 6
+    LIST_GRAIN = 512, /* Gaussians whose records are made together; a multiple of 16 */
+    LIST_FACES = 6
 };
 
 /* x = x_u u + x_v v + x_w w with x_u = dual[0] . x and so on: exact for axes that are at right angles only to
    float rounding. */
-typedef struct view_frame {
+typedef struct list_frame {
     float axis[3][3]; /* u, v, w: world, unit */
     double dual[3][3];
     double origin[3];
-} view_frame;
+} list_frame;
 
 /* Range of slopes; nothing is in it when low > high. */
 typedef struct slope_box {
@@ -35,59 +34,59 @@ typedef struct slope_box {
 } slope_box;
 
 /* Rays of a tile of pixels that one face sees. */
-typedef struct view_part {
+typedef struct list_part {
     uint32_t tile;
     uint8_t face;
     bool whole; /* all of the tile's rays */
     bool first; /* of the tile: pixels without a ray are its */
     bool sees;  /* of some ray a part of its way is left (ray_image.near); else no Gaussian is listed */
-} view_part;
+} list_part;
 
-/* Slopes of sixteen parts, or of sixteen such boxes: lowest a, highest a, lowest b, highest b. */
-typedef struct part_boxes {
+/* Sixteen slope_box: lowest a, highest a, lowest b, highest b. */
+typedef struct box_lanes {
     _Alignas(64) float edge[4][16];
-} part_boxes;
+} box_lanes;
 
 /* One face and its parts, which stand together. */
-typedef struct view_face {
-    view_frame frame;
+typedef struct list_face {
+    list_frame frame;
     slope_box bounds; /* of all its parts */
     size_t first_part, part_count;
-    size_t first_boxes, first_group; /* of its boxes; of the boxes around sixteen of those */
-    size_t boxes, groups;            /* how many */
-} view_face;
+    size_t first_box16, box16_count; /* its part of list_view.boxes16 */
+    size_t first_box256, box256_count;
+} list_face;
 
 /* A Gaussian on the rays of a face (view_form16.h has the formulas). */
-typedef struct view_record {
+typedef struct list_record {
     double a, b; /* slopes of the mean */
     float q[5], depth, falloff, opacity, color[3];
     uint32_t id; /* with RECORD_GENERAL */
-} view_record;
-enum { RECORD_GENERAL = 1u << 31 }; /* the form does not hold for it: see view_ellipsoid */
+} list_record;
+enum { RECORD_GENERAL = 1u << 31 }; /* the form does not hold for it: see list_ellipsoid */
 
-static inline uint32_t record_id(const view_record *r) { return r->id & ~(uint32_t)RECORD_GENERAL; }
-static inline bool record_is_general(const view_record *r) { return (r->id & RECORD_GENERAL) != 0; }
+static inline uint32_t record_id(const list_record *r) { return r->id & ~(uint32_t)RECORD_GENERAL; }
+static inline bool record_is_general(const list_record *r) { return (r->id & RECORD_GENERAL) != 0; }
 
 /* Where it can be hit. Seen from its mean, the outline is the ellipse (c0 x + c1 y)^2 + (c2 y)^2 <= 1 about
    (x, y); a little larger than it is, for rounding. */
-typedef struct view_outline {
+typedef struct list_outline {
     float x, y, chol[3], half[2]; /* half: extents of the ellipse */
     float kappa;                  /* t >= |(a, b, 1)| depth (1 - kappa) / w1 */
-} view_outline;
+} list_outline;
 
 /* In place of the outline of a Gaussian that the form does not hold for, because it would, if it were
    opaque, reach behind the near depth or be as large as it is far: centre and covariance of its ellipsoid in
    the face's axes. */
-typedef struct view_ellipsoid {
+typedef struct list_ellipsoid {
     float center[3], uu, vv, ww, uw, vw;
-} view_ellipsoid;
+} list_ellipsoid;
 
-typedef union view_shape {
-    view_outline outline;
-    view_ellipsoid ellipsoid;
-} view_shape;
+typedef union list_shape {
+    list_outline outline;
+    list_ellipsoid ellipsoid;
+} list_shape;
 
-_Static_assert(sizeof(view_record) == 64 && sizeof(view_shape) == 32, "a cache line, and half of one");
+_Static_assert(sizeof(list_record) == 64 && sizeof(list_shape) == 32, "a cache line, and half of one");
 
 /* A Gaussian in the list of a tile. */
 typedef struct list_pair {
@@ -106,28 +105,28 @@ typedef struct gradient_slot {
 /* Sums of gradient_record, of the Gaussians or records of a block. Arrays that lie 2,048 bytes apart would
    compete for the same lines of the cache. */
 typedef struct block_sums {
-    _Alignas(64) float sum[GRADIENT_FLOATS][VIEW_GRAIN + 16];
+    _Alignas(64) float sum[GRADIENT_FLOATS][LIST_GRAIN + 16];
 } block_sums;
 
-/* The records that one face has of a block of VIEW_GRAIN Gaussians. */
-typedef struct view_kept {
+/* The records that one face has of a block of LIST_GRAIN Gaussians. */
+typedef struct list_kept {
     size_t first;
     uint32_t records, general; /* general: those of them whose shapes are ellipsoids */
-} view_kept;
+} list_kept;
 
 typedef struct list_view {
-    view_face face[VIEW_FACES];
-    int face_count;   /* 1 or VIEW_FACES */
-    view_part *parts; /* face by face, in the order of the tiles; with one face, a part is a tile */
+    list_face face[LIST_FACES];
+    int face_count;   /* 1 or LIST_FACES */
+    list_part *parts; /* face by face, in the order of the tiles; with one face, a part is a tile */
     size_t part_count;
-    slope_box *boxes;   /* of each part's rays */
-    part_boxes *fine;   /* the same, face by face, */
-    part_boxes *group;  /* and boxes around sixteen of those */
-    size_t block_count; /* of Gaussians */
-    uint16_t *reached;  /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
-    view_kept *kept;    /* [face][block] */
-    view_record *records;
-    view_shape *shapes;   /* as many, and one more: shapes are read two at a time */
+    slope_box *part_boxes; /* [parts] around each part's rays */
+    box_lanes *boxes16;    /* the same of sixteen parts each, face by face */
+    box_lanes *boxes256;   /* and sixteen boxes around sixteen parts each */
+    size_t block_count;    /* of Gaussians */
+    uint16_t *reached;     /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
+    list_kept *kept;       /* [face][block] */
+    list_record *records;
+    list_shape *shapes;   /* as many, and one more: shapes are read two at a time */
     uint32_t *slot_first; /* [records] */
     uint32_t *slot_count;
     list_pair *pairs; /* part by part, by index of the Gaussian */
@@ -137,13 +136,13 @@ typedef struct list_view {
     uint8_t *slot_used;   /* [pairs]; the others are not set */
 } list_view;
 
-static inline const view_frame *part_frame(const list_view *view, size_t part)
+static inline const list_frame *part_frame(const list_view *view, size_t part)
 {
     return &view->face[view->parts[part].face].frame;
 }
 
 /* x . axis of the first face's three. */
-static inline void face_components(const view_frame *frame, const float d[3], float out[3])
+static inline void face_components(const list_frame *frame, const float d[3], float out[3])
 {
     for (int k = 0; k < 3; k++)
         out[k] = (float)frame->dual[k][0] * d[0] + (float)frame->dual[k][1] * d[1] +
@@ -160,7 +159,7 @@ static inline int face_of(const float component[3])
 }
 
 /* Whether a ray of the part's tile is one of the part. */
-static inline bool part_has_ray(const list_view *view, const view_part *part, const float d[3])
+static inline bool part_has_ray(const list_view *view, const list_part *part, const float d[3])
 {
     float component[3];
     if (part->whole)
@@ -170,8 +169,9 @@ static inline bool part_has_ray(const list_view *view, const view_part *part, co
 }
 
 /* May a ray of these slopes meet the ellipsoid? By its tangent planes. */
-static inline bool ellipsoid_meets_box(const view_ellipsoid *e, const slope_box *box)
+static inline bool ellipsoid_meets_box(const list_ellipsoid *e, const slope_box *box)
 {
+    /* 64 roundings of the largest coordinates; few are made. */
     const float slack = 4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2]));
     const float behind = -e->center[2] - slack;
     if (behind > 0 && behind * behind > e->ww)
@@ -188,52 +188,5 @@ static inline bool ellipsoid_meets_box(const view_ellipsoid *e, const slope_box 
     }
     return true;
 }
-
-/* Memory of one tile in flight. Start from {0}. */
-typedef struct list_scratch {
-    float *list; /* the tile's Gaussians, list16.h */
-    size_t list_capacity;
-    float *rows; /* of a packet, list_rows16.h */
-    size_t row_capacity;
-    void *hits; /* of one ray */
-    size_t hit_bytes;
-    gradient_slot *sums;
-    size_t sum_capacity;
-} list_scratch;
-
-static inline void list_scratch_free(list_scratch *s)
-{
-    mem_free(s->list);
-    mem_free(s->rows);
-    mem_free(s->hits);
-    mem_free(s->sums);
-    *s = (list_scratch){0};
-}
-
-typedef struct list_kernel {
-    /** Set view->reached of the Gaussians of a block. */
-    void (*find_reached)(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block);
-    /** Write the records of those Gaussians of a block that can be seen through the bounds of a face, in
-       their order. `reached`: bits of those that come into question, a word for sixteen; NULL: all. */
-    view_kept (*make_records)(const kernel_scene *scene, const gaussians *g, const view_face *face,
-                              size_t block, const uint16_t *reached, view_record *records,
-                              view_shape *shapes);
-    /** The parts of a face that a record may be hit in, in their order; returned is how many. There is room
-        for sixteen more than the face has. */
-    size_t (*find_parts)(const list_view *view, const view_face *face, size_t record, uint32_t *parts);
-    /** Trace a part of the view, as tile_forward_fn. */
-    bool (*forward)(const kernel_scene *scene, const list_view *view, size_t part, const tile_rays *rays,
-                    packet_output out[TILE_PACKETS], hit_tape *tape, list_scratch *scratch,
-                    kernel_counters *counters);
-    /** Its adjoint, into the slots of the part's pairs. */
-    bool (*backward)(const kernel_scene *scene, list_view *view, size_t part, const tile_rays *rays,
-                     float d_rgb[TILE_PACKETS][3][PACKET_LANES], const hit_tape *tape, list_scratch *scratch);
-    /** Sums of the records [begin, end) of a face, a block at most, over their slots, turned into the
-        Gaussians' own axes. */
-    void (*turn_sums)(const kernel_scene *scene, const list_view *view, const view_face *face, size_t begin,
-                      size_t end, block_sums *out);
-} list_kernel;
-
-CPU_DECLARE_VARIANTS(list_kernel, list_kernel);
 
 #endif

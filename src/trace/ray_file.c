@@ -12,8 +12,6 @@
 
 enum { RAY_CHANNELS = 6 };
 
-static const double origin_max = 1e17; /* as for cameras */
-
 /* 0 to 5: origin x, y, z, direction x, y, z; -1: none of them. */
 static int slot_of(const char *name)
 {
@@ -61,8 +59,8 @@ static gbt_status take_rays(const char *path, const image *im, const int channel
         for (int k = 0; k < RAY_CHANNELS; k++) {
             value[k] =
                 (double)im->pixels[i * (size_t)im->channels + (size_t)channel[k]] - (k < 3 ? origin[k] : 0);
-            fine =
-                fine && (k < 3 ? fabs(value[k]) < origin_max : isfinite(value[k])); /* both false for NaN */
+            fine = fine &&
+                   (k < 3 ? fabs(value[k]) < RAY_ORIGIN_LIMIT : isfinite(value[k])); /* both false for NaN */
         }
         if (!fine)
             return base_fail(err, GBT_ERR_FORMAT,

@@ -20,9 +20,6 @@
 
 enum { ROW_GRAIN = 8 };
 
-/* The tracer sees no ray that starts farther out. */
-static const double origin_max = 1e17;
-
 /* Directions of about so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
 static const size_t kept_rays = (size_t)1 << 23;
 
@@ -262,8 +259,8 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
                          shot->focus_distance);
     if (ray_shot_sample_count(shot) < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: %d samples (wanted >= 1)", shot->samples);
-    if (!(origin_bound(shot, lens) < origin_max))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: rays start farther out than %g", origin_max);
+    if (!(origin_bound(shot, lens) < RAY_ORIGIN_LIMIT))
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: rays start farther out than %g", RAY_ORIGIN_LIMIT);
     return GBT_OK;
 }
 
@@ -276,7 +273,7 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
 /* All arrays but those of the lenses. */
 static void free_rays(ray_image *rays)
 {
-    float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->through};
+    float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->T_front};
     for (int i = 0; i < 5; i++) {
         mem_free(*all[i]);
         *all[i] = NULL;

@@ -4,6 +4,7 @@
 #ifndef GBT_TRACE_RAYS_H
 #define GBT_TRACE_RAYS_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -11,6 +12,9 @@
 #include "base/camera_lens.h"
 #include "gbtrace/camera.h"
 #include "gbtrace/status.h"
+
+/** Coordinates of a ray's origin are below it: squares of them have to stay finite in float. */
+#define RAY_ORIGIN_LIMIT 1e17
 
 enum { RAY_LENSES = 16 /* a photo trained on every fourth pixel of a row and a column is as many lenses */ };
 
@@ -20,7 +24,8 @@ typedef struct ray_lens {
     double *dir; /* NULL: none yet */
 } ray_lens;
 
-/** Row-major. A ray with a zero direction is invalid: it sees the background, and its transmittance is 1. */
+/** Row-major. A ray with a zero direction is invalid, to the tracer also one that is not ray_is_sound(): it
+    sees the background, and its transmittance is 1. */
 typedef struct ray_image {
     int width, height;
     float *origin; /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local
@@ -31,7 +36,7 @@ typedef struct ray_image {
                    there); owned */
     /* A part of each ray, when `near` is not NULL; [height * width] both, owned: */
     float *near;      /* nothing nearer than this distance is seen; not below `far`: nothing at all */
-    float *through;   /* transmittance of what lies before the part: T starts from it */
+    float *T_front;   /* transmittance of what lies before the part: T starts from it */
     camera_lens lens; /* prepared, of the shot's camera; fx is 0 when the rays were given */
     /* Kept by ray_image_from_shot() for the next poses of the same lenses, of any size. */
     ray_lens lenses[RAY_LENSES];
@@ -41,8 +46,8 @@ typedef struct ray_image {
 /** How one picture is taken. Start from ray_shot_of(). Lengths in scene-local units. */
 typedef struct ray_shot {
     gbt_camera camera; /* lens, size, pose, and its motion while a rolling shutter reads it out */
-    bool one_start;    /* all rays of a rolling shutter start at the centre of the camera's own pose, and look
-                          where    they look. Default false */
+    bool one_start;    /* all rays of a rolling shutter start at the centre of the camera's own pose, and keep
+                          their directions. Default false */
     double aperture_radius; /* >= 0; 0, the default, is a pinhole */
     double focus_distance;  /* > 0 when there is an aperture: depth of the plane in focus, or its radius where
                                it is a sphere */
@@ -73,8 +78,8 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  * Formulas: docs/cameras.md.
  * - Line i of n (row or column) of a rolling shutter is taken (i + 0.5) / n of the readout after its start.
  * - The aperture is cut into N cells of the same area; sample s of N leaves it at a point of cell s, drawn
- * evenly for (seed, s, pixel).
- *   It goes through the point that the ray through the middle of the aperture has in focus.
+ *   evenly for (seed, s, pixel). It goes through the point that the ray through the middle of the aperture
+ *   has in focus.
  *
  * @param sample [in] 0 .. ray_shot_sample_count() - 1
  * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size
@@ -105,6 +110,29 @@ static inline size_t ray_image_count(const ray_image *rays)
 static inline const float *ray_image_origin(const ray_image *rays, size_t i)
 {
     return rays->common_origin ? rays->origin : rays->origin + 3 * i;
+}
+
+/** Of the squared length of a direction, or of several in a vector: is it a unit vector? Rounding alone is
+   far within the limits. */
+#define RAY_SQUARE_IS_SOUND(square) (((square) > 0.99f) & ((square) < 1.01f))
+
+/** False for NaN, as the next. */
+static inline bool ray_direction_is_sound(const float d[3])
+{
+    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return RAY_SQUARE_IS_SOUND(square);
+}
+
+static inline bool ray_origin_is_sound(const float o[3])
+{
+    const float limit = (float)RAY_ORIGIN_LIMIT;
+    return fabsf(o[0]) < limit && fabsf(o[1]) < limit && fabsf(o[2]) < limit;
+}
+
+/** Does the ray count? Others see the background. */
+static inline bool ray_is_sound(const float o[3], const float d[3])
+{
+    return ray_direction_is_sound(d) && ray_origin_is_sound(o);
 }
 
 /** Largest |coordinate| of an origin: what trace_build() wants to know. */

@@ -92,6 +92,7 @@ typedef struct hit_list {
 /* One ray and what it sees of. */
 typedef struct sight {
     double origin[3], dir[3], near, far;
+    double T_front; /* ray_image.T_front */
     bool own_order; /* hits are sorted by their depth; else by packet_depth() of these, from one origin: */
     const ray_image *rays;
     size_t middle, packet[PACKET], packet_count; /* packet: from the middle one on, those that are rays */
@@ -113,12 +114,6 @@ static double far_of(const ray_image *rays, size_t i)
 static double near_of(const ray_image *rays, size_t i)
 {
     return rays->near == NULL ? 0 : (double)rays->near[i];
-}
-
-/* T where a ray's part begins. */
-static double through_of(const ray_image *rays, size_t i)
-{
-    return rays->near == NULL ? 1 : (double)rays->through[i];
 }
 
 /* Where a Gaussian that one of a packet's rays hits stands in the one order of all of them. */
@@ -207,6 +202,7 @@ static void see(const trace_settings *s, const ray_image *rays, size_t i, sight 
     ray_of(rays, i, out->origin, out->dir);
     out->near = near_of(rays, i);
     out->far = far_of(rays, i);
+    out->T_front = rays->near == NULL ? 1 : (double)rays->T_front[i];
     out->own_order = !s->packet_order;
     out->rays = rays;
     out->packet_count = 0;
@@ -245,8 +241,8 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
         sight ray;
         see(job->s, job->rays, i, &ray);
         job->status[block] = gather(job->all, job->scene->count, job->s, &ray, &list, NULL);
-        const size_t n = blend(job->scene, job->s, &list, ray.dir, through_of(job->rays, i), job->rgb + 3 * i,
-                               &transmittance);
+        const size_t n =
+            blend(job->scene, job->s, &list, ray.dir, ray.T_front, job->rgb + 3 * i, &transmittance);
         if (job->transmittance != NULL)
             job->transmittance[i] = transmittance;
         if (job->blended != NULL)
@@ -279,19 +275,18 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
 
 /* Chain from dL/dalpha of one hit to the fields of its Gaussian. */
 static void respond_backward(const reference_scene *scene, const prepared *p, const trace_settings *s,
-                             const double origin[3], const double dir[3], size_t id, double d_alpha,
-                             double *d_gaussians)
+                             const sight *ray, size_t id, double d_alpha, double *d_gaussians)
 {
     reference_hit hit;
     double v[3], q[4], scale[3];
-    if (!respond(p, s, origin, dir, &hit, v))
+    if (!respond(p, s, ray->origin, ray->dir, &hit, v))
         return;
     const double response = exp(-0.5 * hit.d2);
     if (p->opacity * response >= (double)s->alpha_max)
         return;
     double *const d = d_gaussians + id;
     const size_t n = scene->count;
-    const double d_d2 = -0.5 * hit.alpha * d_alpha;
+    const double h = -0.5 * hit.alpha * d_alpha; /* dL/d(d2) */
     d[REFERENCE_opacity * n] += response * d_alpha;
     for (int k = 0; k < 3; k++)
         scale[k] = field(scene, REFERENCE_scale_x + (unsigned)k, id);
@@ -300,42 +295,42 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
     double d_mean[3];
     dmat_apply_transposed(p->canon, v, d_mean);
     for (size_t k = 0; k < 3; k++) {
-        d[(REFERENCE_mean_x + k) * n] -= 2 * d_d2 * d_mean[k];
-        d[(REFERENCE_scale_x + k) * n] -= 2 * d_d2 * v[k] * v[k] / scale[k];
+        d[(REFERENCE_mean_x + k) * n] -= 2 * h * d_mean[k];
+        d[(REFERENCE_scale_x + k) * n] -= 2 * h * v[k] * v[k] / scale[k];
     }
     /* a = 2 dL/domega for the local turn R <- R exp[omega]; dL/dq = q (0, a), orthogonal to q. */
-    const double a0 = 4 * d_d2 * v[1] * v[2] * (scale[2] / scale[1] - scale[1] / scale[2]);
-    const double a1 = 4 * d_d2 * v[2] * v[0] * (scale[0] / scale[2] - scale[2] / scale[0]);
-    const double a2 = 4 * d_d2 * v[0] * v[1] * (scale[1] / scale[0] - scale[0] / scale[1]);
+    const double a0 = 4 * h * v[1] * v[2] * (scale[2] / scale[1] - scale[1] / scale[2]);
+    const double a1 = 4 * h * v[2] * v[0] * (scale[0] / scale[2] - scale[2] / scale[0]);
+    const double a2 = 4 * h * v[0] * v[1] * (scale[1] / scale[0] - scale[0] / scale[1]);
     d[REFERENCE_quat_w * n] -= q[1] * a0 + q[2] * a1 + q[3] * a2;
     d[REFERENCE_quat_x * n] += q[0] * a0 + q[2] * a2 - q[3] * a1;
     d[REFERENCE_quat_y * n] += q[0] * a1 + q[3] * a0 - q[1] * a2;
     d[REFERENCE_quat_z * n] += q[0] * a2 + q[1] * a1 - q[2] * a0;
 }
 
-/* Back to front: `behind` is the colour and `open` the transmittance of everything behind a hit, so nothing
-   is divided by 1 - alpha. */
+/* Back to front: `behind` is the colour and `T_behind` the transmittance of everything behind a hit, so
+   nothing is divided by 1 - alpha. */
 static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
-                         const double origin[3], const double dir[3], const hit_list *list, double through,
-                         const double d_rgb[3], double d_transmittance, double *d_gaussians)
+                         const sight *ray, const hit_list *list, const double d_rgb[3],
+                         double d_transmittance, double *d_gaussians)
 {
-    double rgb[3], T, behind[3], open = 1;
-    const size_t blended = blend(scene, s, list, dir, through, rgb, &T);
-    sky_color_exact(&s->sky, s->background, dir, behind);
+    double rgb[3], T_left, behind[3], T_behind = 1;
+    const size_t blended = blend(scene, s, list, ray->dir, ray->T_front, rgb, &T_left);
+    sky_color_exact(&s->sky, s->background, ray->dir, behind);
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];
-        double in_front = through;
+        double T = ray->T_front;
         for (size_t j = 0; j < i; j++)
-            in_front *= 1 - list->hits[j].alpha;
-        double d_alpha = -in_front * open * d_transmittance;
+            T *= 1 - list->hits[j].alpha;
+        double d_alpha = -T * T_behind * d_transmittance;
         for (size_t c = 0; c < 3; c++) {
             const double colour = field(scene, REFERENCE_red + (unsigned)c, hit->id);
-            d_gaussians[(REFERENCE_red + c) * scene->count + hit->id] += in_front * hit->alpha * d_rgb[c];
-            d_alpha += in_front * (colour - behind[c]) * d_rgb[c];
+            d_gaussians[(REFERENCE_red + c) * scene->count + hit->id] += T * hit->alpha * d_rgb[c];
+            d_alpha += T * (colour - behind[c]) * d_rgb[c];
             behind[c] = hit->alpha * colour + (1 - hit->alpha) * behind[c];
         }
-        open *= 1 - hit->alpha;
-        respond_backward(scene, &all[hit->id], s, origin, dir, hit->id, d_alpha, d_gaussians);
+        T_behind *= 1 - hit->alpha;
+        respond_backward(scene, &all[hit->id], s, ray, hit->id, d_alpha, d_gaussians);
     }
 }
 
@@ -351,7 +346,7 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
         see(s, rays, i, &ray);
         status = gather(all, scene->count, s, &ray, &list, err);
         if (status == GBT_OK)
-            ray_backward(scene, all, s, ray.origin, ray.dir, &list, through_of(rays, i), d_rgb + 3 * i,
+            ray_backward(scene, all, s, &ray, &list, d_rgb + 3 * i,
                          d_transmittance != NULL ? d_transmittance[i] : 0, d_gaussians);
     }
     mem_free(list.hits);
@@ -364,7 +359,7 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
                                     size_t *count, size_t *capacity, gbt_error *err)
 {
     hit_list list = {*hits, 0, *capacity};
-    sight ray = {.far = HUGE_VAL, .own_order = true};
+    sight ray = {.far = HUGE_VAL, .T_front = 1, .own_order = true};
     memcpy(ray.origin, origin, sizeof ray.origin);
     memcpy(ray.dir, dir, sizeof ray.dir);
     prepared *all = NULL;

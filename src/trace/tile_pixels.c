@@ -26,18 +26,11 @@ static bool packet_pixel(const ray_image *rays, int x0, int y0, int packet, size
     return x + PACKET_PIXELS <= rays->width && y + PACKET_PIXELS <= rays->height;
 }
 
-/* Written so that NaN fails: a ray that is not a unit vector from a sensible place sees the background. */
-static bool ray_is_sound(const float d[3], const float o[3])
-{
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return square > 0.99f && square < 1.01f && fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
-}
-
 /* A ray of the packet; it is not active when it is outside the image or none. */
 static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 {
     const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
-    if (!ray_is_sound(d, o))
+    if (!ray_is_sound(o, d))
         return;
     for (int axis = 0; axis < 3; axis++) {
         p->dir[axis][lane] = d[axis];
@@ -46,7 +39,7 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
     p->far[lane] = rays->far == NULL ? INFINITY : rays->far[at];
     if (rays->near != NULL) {
         p->near[lane] = rays->near[at];
-        p->through[lane] = rays->through[at];
+        p->T_front[lane] = rays->T_front[at];
         if (!(p->near[lane] < p->far[lane]))
             return;
     }
@@ -57,7 +50,7 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
 {
     const float *o = rays->origin;
-    const bool here = fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f;
+    const bool here = ray_origin_is_sound(o);
     const four_ints lane_bits = {1, 2, 4, 8};
     four_ints sound = {0, 0, 0, 0};
     for (int row = 0; row < PACKET_PIXELS; row++) {
@@ -65,8 +58,8 @@ static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *
         load_triples(rays->dir + 3 * (first + (size_t)row * (size_t)rays->width), d);
         for (int axis = 0; axis < 3; axis++)
             four_store(p->dir[axis] + PACKET_PIXELS * row, d[axis]);
-        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; /* as ray_is_sound */
-        sound |= (square > 0.99f) & (square < 1.01f) & (lane_bits << (PACKET_PIXELS * row));
+        const four_floats square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        sound |= RAY_SQUARE_IS_SOUND(square) & (lane_bits << (PACKET_PIXELS * row));
     }
     for (int axis = 0; axis < 3; axis++)
         for (int lane = 0; lane < PACKET_LANES; lane++)
@@ -90,13 +83,13 @@ static void repeat_active(packet_rays *p, bool parts)
         p->far[lane] = p->far[first];
         if (parts) {
             p->near[lane] = p->near[first];
-            p->through[lane] = p->through[first];
+            p->T_front[lane] = p->T_front[first];
         }
     }
 }
 
 /* Leave to a part of a tile what is its own. */
-static void keep_part(const list_view *view, const view_part *part, packet_rays *p, uint16_t *elsewhere)
+static void keep_part(const list_view *view, const list_part *part, packet_rays *p, uint16_t *elsewhere)
 {
     unsigned own = part->first ? ~p->active : 0;
     for (int lane = 0; lane < PACKET_LANES; lane++) {
@@ -109,7 +102,7 @@ static void keep_part(const list_view *view, const view_part *part, packet_rays 
 }
 
 void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
-                    const view_part *part, tile_rays *out)
+                    const list_part *part, tile_rays *out)
 {
     out->common_origin = rays->common_origin;
     out->parts = rays->near != NULL;
@@ -145,12 +138,12 @@ static float plain_background(const trace_settings *s, size_t c)
 static void store_pixel(const ray_image *rays, const kernel_scene *scene, const trace_outputs *out, size_t at,
                         const packet_output *o, int lane)
 {
-    const float before = rays->near != NULL ? rays->through[at] : 1;
+    const float T_front = rays->near != NULL ? rays->T_front[at] : 1;
     for (size_t c = 0; c < 3; c++)
         out->rgb->pixels[3 * at + c] =
-            o == NULL ? before * plain_background(&scene->settings, c) : o->rgb[c][lane];
+            o == NULL ? T_front * plain_background(&scene->settings, c) : o->rgb[c][lane];
     if (out->transmittance != NULL)
-        out->transmittance[at] = o == NULL ? before : o->transmittance[lane];
+        out->transmittance[at] = o == NULL ? T_front : o->transmittance[lane];
     if (out->ended != NULL)
         out->ended[at] = o != NULL && (o->ended >> lane & 1) != 0;
     if (!scene->extra)

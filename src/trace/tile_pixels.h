@@ -11,7 +11,7 @@
 /** Rays of a tile, or of a part of it (NULL: all); lanes outside the image or without a ray are not active.
  */
 void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
-                    const view_part *part, tile_rays *out);
+                    const list_part *part, tile_rays *out);
 
 /** What was traced, into the pictures that `to` asks for. A pixel without a ray becomes the background; those
     of another part stay. */

@@ -14,6 +14,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "trace/tile_pixels.h"
+#include "trace/tree_kernel.h"
 
 enum { RECORD_BLOCK = 512 };
 
@@ -24,7 +25,7 @@ typedef struct trace_tile { /* or the part of one that a face of a view sees */
     kernel_counters counters;
 } trace_tile;
 
-static const tile_kernel *kernel_for(cpu_isa isa) { return CPU_VARIANT(tile_kernel, isa); }
+static const tree_kernel *tree_kernel_for(cpu_isa isa) { return CPU_VARIANT(tree_kernel, isa); }
 
 static const list_kernel *list_kernel_for(cpu_isa isa) { return CPU_VARIANT(list_kernel, isa); }
 
@@ -97,7 +98,7 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
 /* ---- memory of the tiles in flight, from tile to tile ---- */
 
 typedef struct tile_scratch {
-    kernel_scratch tree;
+    tree_scratch tree;
     list_scratch list;
 } tile_scratch;
 
@@ -141,9 +142,9 @@ static void scratch_pool_free(scratch_pool *pool)
 
 typedef struct pass {
     trace_scene *scene;
-    kernel_scene view;
-    const tile_kernel *kernel;
-    tile_forward_fn *forward;
+    kernel_scene inputs;
+    const tree_kernel *tree;
+    tree_forward_fn *forward;
     const list_kernel *list; /* NULL: by `forward` and the tree */
     const ray_image *rays;
     int tiles_across;
@@ -159,8 +160,8 @@ static bool trace_tile_rays(pass *p, trace_tile *tile, const tile_rays *rays, pa
 {
     hit_tape *tape = keep_tape ? &tile->tape : NULL;
     if (p->list == NULL)
-        return p->forward(&p->view, rays, out, tape, &scratch->tree, counters);
-    return p->list->forward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles), rays, out,
+        return p->forward(&p->inputs, rays, out, tape, &scratch->tree, counters);
+    return p->list->forward(&p->inputs, &p->scene->lists.view, (size_t)(tile - p->scene->tiles), rays, out,
                             tape, &scratch->list, counters);
 }
 
@@ -181,7 +182,7 @@ static bool forward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int x
         out[packet].ended = 0;
     if (!trace_tile_rays(p, tile, rays, out, p->keep_tape, scratch, &tile->counters))
         return false;
-    tile_store_pixels(p->rays, &p->view, &p->out, x0, y0, rays, out);
+    tile_store_pixels(p->rays, &p->inputs, &p->out, x0, y0, rays, out);
     const size_t bytes = hit_tape_bytes(&tile->tape);
     tile->tape_dropped = p->keep_tape &&
                          atomic_fetch_add(&p->tape_bytes, bytes) + bytes > p->scene->tape_bytes_max &&
@@ -204,10 +205,10 @@ static bool backward_tile(pass *p, trace_tile *tile, const tile_rays *rays, int 
     kernel_counters counters = {0};
     bool fine = !tile->tape_dropped || trace_tile_rays(p, tile, rays, again, true, scratch, &counters);
     if (p->list == NULL)
-        fine = fine && p->kernel->backward(&p->view, rays, d_rgb, tile->tape.entries, &tile->gradients,
-                                           &scratch->tree);
+        fine = fine && p->tree->backward(&p->inputs, rays, d_rgb, tile->tape.entries, &tile->gradients,
+                                         &scratch->tree);
     else
-        fine = fine && p->list->backward(&p->view, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
+        fine = fine && p->list->backward(&p->inputs, &p->scene->lists.view, (size_t)(tile - p->scene->tiles),
                                          rays, d_rgb, &tile->tape, &scratch->list);
     empty_tape(p, &tile->tape);
     return fine && gradient_list_close(&tile->gradients) == GBT_OK;
@@ -226,7 +227,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
     trace_tile *tile = &p->scene->tiles[index];
     tile_rays rays;
     const list_view *view = &p->scene->lists.view;
-    const view_part *part = p->list != NULL ? &view->parts[index] : NULL;
+    const list_part *part = p->list != NULL ? &view->parts[index] : NULL;
     const size_t number = part != NULL ? part->tile : index;
     const int x0 = (int)(number % (size_t)p->tiles_across) * TILE_PIXELS,
               y0 = (int)(number / (size_t)p->tiles_across) * TILE_PIXELS;
@@ -237,7 +238,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
         empty_tape(p, &tile->tape);
         memset(&tile->counters, 0, sizeof tile->counters);
     }
-    tile_load_rays(p->rays, &p->view.settings, x0, y0, view, part, &rays);
+    tile_load_rays(p->rays, &p->inputs.settings, x0, y0, view, part, &rays);
     tile_scratch own = {{0}, {0}}, *place = scratch_take(p->scene->scratch),
                  *scratch = place != NULL ? place : &own;
     const bool fine = p->d_rgb == NULL ? forward_tile(p, tile, &rays, x0, y0, scratch)
@@ -267,11 +268,11 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     if (scene->scratch == NULL &&
         (scene->scratch = mem_calloc(1, sizeof *scene->scratch, "scratch of tiles", err)) == NULL)
         return GBT_ERR_NO_MEMORY;
-    p->kernel = kernel_for(cpu_best_isa());
+    p->tree = tree_kernel_for(cpu_best_isa());
     p->list = scene->listed ? list_kernel_for(cpu_best_isa()) : NULL;
-    p->forward = scene->kernel == TRACE_EMBREE   ? p->kernel->forward_embree
-                 : scene->kernel == TRACE_SINGLE ? p->kernel->forward_single
-                                                 : p->kernel->forward;
+    p->forward = scene->kernel == TRACE_EMBREE   ? p->tree->forward_embree
+                 : scene->kernel == TRACE_SINGLE ? p->tree->forward_single
+                                                 : p->tree->forward;
     atomic_init(&p->tape_bytes, 0);
     atomic_init(&p->failed, false);
     parallel_blocks(count, 1, run_tile, p);
@@ -289,9 +290,9 @@ static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_er
     scene->listed = false;
     if (scene->kernel != TRACE_LIST)
         return GBT_OK;
-    const kernel_scene view = scene_for_kernel(scene);
-    GBT_TRY(view_lists_make(&scene->lists, list_kernel_for(cpu_best_isa()), &view, scene->source, rays,
-                            &scene->listed, err));
+    const kernel_scene inputs = scene_for_kernel(scene);
+    GBT_TRY(list_builder_make(&scene->lists, list_kernel_for(cpu_best_isa()), &inputs, scene->source, rays,
+                              &scene->listed, err));
     if (!scene->listed && rays->near != NULL)
         return base_fail(
             err, GBT_ERR_ARGUMENT,
@@ -312,9 +313,9 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
                          "trace: parts of rays have no adjoint, and are traced by TRACE_LIST alone");
     GBT_TRY(prepare_view(scene, rays, err));
     pass p = {
-        .scene = scene, .view = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
-    p.view.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
-                   out->hit_count != NULL || out->strongest != NULL;
+        .scene = scene, .inputs = scene_for_kernel(scene), .rays = rays, .keep_tape = keep_tape, .out = *out};
+    p.inputs.extra = out->depth != NULL || out->median_depth != NULL || out->normal != NULL ||
+                     out->hit_count != NULL || out->strongest != NULL;
     scene->tape_width = scene->tape_height = 0;
     GBT_TRY(run_pass(&p, err));
     if (keep_tape) {
@@ -341,7 +342,7 @@ static gbt_status reduce(const pass *p, gaussians *d_gaussians, float *weight, g
 {
     trace_scene *scene = p->scene;
     if (scene->listed)
-        return gradients_reduce_view(p->list, &p->view, &scene->lists.view, scene->source, d_gaussians,
+        return gradients_reduce_view(p->list, &p->inputs, &scene->lists.view, scene->source, d_gaussians,
                                      weight, err);
     const gradient_list **lists = mem_alloc(scene->tile_count, sizeof *lists, "gradient lists", err);
     if (lists == NULL)
@@ -364,10 +365,10 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
                          rays->height, scene->tape_width, scene->tape_height);
-    pass p = {.scene = scene, .view = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
+    pass p = {.scene = scene, .inputs = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
     scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
     if (scene->listed)
-        GBT_TRY(view_lists_reserve_slots(&scene->lists, err));
+        GBT_TRY(list_builder_reserve_slots(&scene->lists, err));
     GBT_TRY(run_pass(&p, err));
     return reduce(&p, d_gaussians, weight, err);
 }
@@ -383,7 +384,7 @@ void trace_scene_free(trace_scene *scene)
     mem_free(scene->tiles);
     mem_free(scene->records);
     gradient_order_free(&scene->order);
-    view_lists_free(&scene->lists);
+    list_builder_free(&scene->lists);
     scratch_pool_free(scene->scratch);
     memset(scene, 0, sizeof *scene);
 }

@@ -2,7 +2,7 @@
 /* trace/trace.h -- ray tracing of Gaussians: build, forward, adjoint.
 
    What one ray sees is defined in docs/tracing.md; reference.h is that definition in double, and this is the
-   same in float32, sixteen rays at a time, over lists of what a tile may see (view_lists.h) or a tree
+   same in float32, sixteen rays at a time, over lists of what a tile may see (list_build.h) or a tree
    (bvh/gaussian_tree.h). */
 #ifndef GBT_TRACE_TRACE_H
 #define GBT_TRACE_TRACE_H
@@ -16,17 +16,17 @@
 #include "bvh/gaussian_scene.h"
 #include "trace/gradients.h"
 #include "trace/kernel.h"
+#include "trace/list_build.h"
 #include "trace/rays.h"
 #include "trace/settings.h"
-#include "trace/view_lists.h"
 
 /** Which way rays go. All give the same picture to float rounding, but of copies of one Gaussian that differ
-    in opacity TRACE_TILE may put the more opaque one first, whatever its index; the adjoint is the same for
+    in opacity TRACE_TREE may put the more opaque one first, whatever its index; the adjoint is the same for
     all. */
 typedef enum trace_kernel {
     TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
-                     point and not too many Gaussians are near it; else as TRACE_TILE */
-    TRACE_TILE,   /* 16 x 16 pixels share one way through the tree */
+                     point and not too many Gaussians are near it; else as TRACE_TREE */
+    TRACE_TREE,   /* 16 x 16 pixels share one way through the tree */
     TRACE_SINGLE, /* ray by ray: for rays that do not run together */
     TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
 } trace_kernel;
@@ -50,7 +50,7 @@ typedef struct trace_scene {
     size_t tile_count, tile_capacity;
     int tape_width, tape_height;  /* rays of the forward pass that the tape holds; 0: none */
     gradient_order order;         /* internal */
-    view_lists lists;             /* of the last forward pass, for TRACE_LIST */
+    list_builder lists;           /* of the last forward pass, for TRACE_LIST */
     bool listed;                  /* whether it went over them */
     struct scratch_pool *scratch; /* internal */
 } trace_scene;

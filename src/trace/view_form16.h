@@ -62,7 +62,8 @@ static inline void view_form_find(const float (*basis)[3], const gaussian_lanes 
     const vfloat16 inverse = vfloat16_div(one, cw2), scale = vfloat16_mul(det, inverse),
                    bu_inverse = vfloat16_div(one, bu_length), length = vfloat16_sqrt(cw2);
     out->distance = vfloat16_div(vfloat16_mul(depth, length), smallest);
-    out->falloff = vfloat16_mul(vfloat16_set1(0.72134752f), vfloat16_mul(out->distance, out->distance));
+    out->falloff =
+        vfloat16_mul(vfloat16_set1((float)HALF_LOG2_E), vfloat16_mul(out->distance, out->distance));
     out->q[0] = vfloat16_mul(dot16(cw, along[0]), inverse);
     out->q[1] = vfloat16_mul(dot16(cw, along[1]), inverse);
     out->q[2] = vfloat16_mul(bu_length, scale);

@@ -330,7 +330,7 @@ static void wide_lenses(void **state) /* A10: lists of six faces */
     camera.params[1] = HEIGHT;
     check_same(&b, &camera, 2e-5);
     assert_true(b.drawer.drawn_cells > 2);
-    assert_true(b.drawer.scene.listed && b.drawer.scene.lists.view.face_count == VIEW_FACES);
+    assert_true(b.drawer.scene.listed && b.drawer.scene.lists.view.face_count == LIST_FACES);
     camera = camera_at(1, 2, 0.5);
     camera.model = GBT_CAMERA_SIMPLE_FISHEYE;
     camera.params[0] = 20;

@@ -386,18 +386,18 @@ misuse 4 "nothing/metrics.json: cannot open: No such file or directory" report n
 printf '{"origin": [0, 0, -8], "target": [0, 0, 0], "up": [0, 1, 0], "fov_x_deg": 40, "width": 40, "height": 32}' >camera.json
 bench="bench trace --model gaussians.ply --camera camera.json --repeats 1"
 prints "bench" '^forward, core-us/ray  *[0-9.]*$' $bench --json one.json
-prints "bench of several kernels gives ratios" '^adjoint, core-us/ray  *[0-9.]*  *[0-9.]*  *[0-9.]*x' $bench --kernel tile,embree --check --json two.json
+prints "bench of several kernels gives ratios" '^adjoint, core-us/ray  *[0-9.]*  *[0-9.]*  *[0-9.]*x' $bench --kernel tree,embree --check --json two.json
 for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candidates_per_packet tests_per_ray hits_per_ray blended_per_ray rows_per_packet \
     row_pairs_per_packet tape_bytes tree_bytes list_bytes record_bytes forward_seconds build_ms; do
     [ "$(grep -c "\"$name\": [0-9]" one.json)" = 2 ] && [ "$(grep -c "\"$name\": [0-9]" two.json)" = 3 ] # at the top, and once per kernel
     report $? "bench writes $name" "$(cat two.json)"
 done
-grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
+grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tree"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
 prints "options of 0 leave it to the preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0 --alpha-max 0 --t-min 0
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9
-misuse 2 '--kernel: "tile,tile" (wanted list, packet, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
+misuse 2 '--kernel: "tree,tree" (wanted list, packet, tree, single, embree or splats, or some of them with commas between)' $bench --kernel tree,tree
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "bench: bad alpha_max (wanted alpha_min, 0.5, or more, got 0.4)" $bench --alpha-min 0.5 --alpha-max 0.4
 misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply

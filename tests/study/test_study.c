@@ -13,13 +13,13 @@ static void lists_of_kernels(void **state)
 {
     (void)state;
     int k[3];
-    assert_int_equal(bench_kernels_parse("tile", k, 3), 1);
-    assert_int_equal(k[0], TRACE_TILE);
-    assert_int_equal(bench_kernels_parse("embree,tile,single", k, 3), 3);
-    assert_true(k[0] == TRACE_EMBREE && k[1] == TRACE_TILE && k[2] == TRACE_SINGLE);
-    static const char *const bad[] = {"",          "tiles",       "til",
-                                      "tile,",     ",tile",       "tile,,embree",
-                                      "tile,tile", "tile embree", "tile,single,embree,tile"};
+    assert_int_equal(bench_kernels_parse("tree", k, 3), 1);
+    assert_int_equal(k[0], TRACE_TREE);
+    assert_int_equal(bench_kernels_parse("embree,tree,single", k, 3), 3);
+    assert_true(k[0] == TRACE_EMBREE && k[1] == TRACE_TREE && k[2] == TRACE_SINGLE);
+    static const char *const bad[] = {"",          "trees",       "tre",
+                                      "tree,",     ",tree",       "tree,,embree",
+                                      "tree,tree", "tree embree", "tree,single,embree,tree"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
         assert_int_equal(bench_kernels_parse(bad[i], k, 3), 0);
     for (int i = 0; i < BENCH_KERNELS; i++) {
@@ -38,10 +38,10 @@ static void ways_in_turn(void **state)
     const cpu_isa before = cpu_best_isa();
     const gbt_camera camera = pinhole_camera(48, 32);
     const bench_splat splat = {&camera, &g, RASTER_PER_RAY};
-    bench_way ways[WAYS] = {{.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s},
+    bench_way ways[WAYS] = {{.kernel = TRACE_TREE, .isa = CPU_AVX512, .settings = s},
                             {.kernel = TRACE_EMBREE, .isa = CPU_AVX512, .settings = s},
-                            {.kernel = TRACE_TILE, .isa = CPU_PLAIN, .settings = s},
-                            {.kernel = TRACE_TILE, .isa = CPU_AVX512, .settings = s, .splat = &splat},
+                            {.kernel = TRACE_TREE, .isa = CPU_PLAIN, .settings = s},
+                            {.kernel = TRACE_TREE, .isa = CPU_AVX512, .settings = s, .splat = &splat},
                             {.kernel = TRACE_LIST, .isa = CPU_AVX512, .settings = s}};
     assert_ok(bench_measure(ways, WAYS, &g, &rays, 2, NULL));
     assert_int_equal(cpu_best_isa(), before);

@@ -10,7 +10,7 @@
 #include "trace/fixture.h"
 #include "reference_once.h"
 #include "trace/ray_hits.h"
-#include "trace/rows16.h"
+#include "trace/tree_rows16.h"
 #include "trace/trace.h"
 
 enum { WIDTH = 40, HEIGHT = 24, RAYS = WIDTH * HEIGHT };
@@ -198,7 +198,7 @@ static void check_run(const char *name, const gaussians *g, const trace_settings
         fail_msg("%s: %zu of %d rays are within rounding of a cut", name, left_out, RAYS);
 }
 
-static const char *const kernel_names[] = {"list", "tile", "single", "embree"};
+static const char *const kernel_names[] = {"list", "tree", "single", "embree"};
 
 static void all_kernels_all_outputs(void **state)
 {
@@ -259,18 +259,18 @@ static void depth_of_faint_hits(void **state)
     gaussians_free(&g);
 }
 
-/* The adjoint of every kernel's hits is that of the tile kernel, to rounding. */
+/* The adjoint of every kernel's hits is that of the tree kernel, to rounding. */
 static void kernels_share_the_adjoint(void **state)
 {
     (void)state;
     gaussians g = cloud(800, 3, 0.8f, 0.15f, 0.8f);
     ray_image rays = make_rays(false);
     const trace_settings s = trace_settings_default();
-    pass_result *tile = run(&g, &s, &rays, TRACE_TILE, 0);
+    pass_result *tree = run(&g, &s, &rays, TRACE_TREE, 0);
     for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
         pass_result *other = run(&g, &s, &rays, (trace_kernel)kernel, 0);
-        const float *const a[] = {tile->d.mean_x, tile->d.scale_y, tile->d.quat_z, tile->d.opacity,
-                                  tile->d.red};
+        const float *const a[] = {tree->d.mean_x, tree->d.scale_y, tree->d.quat_z, tree->d.opacity,
+                                  tree->d.red};
         const float *const b[] = {other->d.mean_x, other->d.scale_y, other->d.quat_z, other->d.opacity,
                                   other->d.red};
         for (size_t f = 0; f < 5; f++) {
@@ -285,7 +285,7 @@ static void kernels_share_the_adjoint(void **state)
         }
         pass_free(other);
     }
-    pass_free(tile);
+    pass_free(tree);
     ray_image_free(&rays);
     gaussians_free(&g);
 }
@@ -337,12 +337,12 @@ static void parts_of_rays(void **state)
     ray_image part = rays;
     part.near = mem_alloc(RAYS, sizeof *part.near, "test", NULL);
     part.far = mem_alloc(RAYS, sizeof *part.far, "test", NULL);
-    part.through = mem_alloc(RAYS, sizeof *part.through, "test", NULL);
+    part.T_front = mem_alloc(RAYS, sizeof *part.T_front, "test", NULL);
     for (int half = 0; half < 2; half++) {
         for (size_t i = 0; i < RAYS; i++) {
             part.near[i] = half == 0 ? 0 : cut[i];
             part.far[i] = half == 0 ? cut[i] : ended[i] != 0 ? 0 : INFINITY;
-            part.through[i] = half == 0 ? 1 : through[0][i];
+            part.T_front[i] = half == 0 ? 1 : through[0][i];
         }
         const trace_outputs out = {.rgb = &rgb, .transmittance = through[half], .ended = ended};
         assert_ok(trace_forward(&scene, &part, false, &out, NULL, NULL));
@@ -372,7 +372,7 @@ static void parts_of_rays(void **state)
     }
     mem_free(part.near);
     mem_free(part.far);
-    mem_free(part.through);
+    mem_free(part.T_front);
     trace_scene_free(&scene);
     image_free(&rgb);
     image_free(&sum);
@@ -414,9 +414,9 @@ static void parts_are_listed_whatever_is_near(void **state)
         assert_ok(image_alloc(&rgb[parts], SIDE, SIDE, 3, NULL));
         if (parts == 1) {
             rays.near = mem_calloc(ALL, sizeof *rays.near, "test", NULL);
-            rays.through = mem_alloc(ALL, sizeof *rays.through, "test", NULL);
+            rays.T_front = mem_alloc(ALL, sizeof *rays.T_front, "test", NULL);
             for (size_t i = 0; i < ALL; i++)
-                rays.through[i] = 1;
+                rays.T_front[i] = 1;
         }
         assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb[parts]}, NULL, NULL));
         assert_int_equal(scene.listed, parts);
@@ -442,7 +442,7 @@ static void no_room_for_the_tape(void **state)
     ray_image rays = make_rays(false);
     trace_settings s = trace_settings_default();
     for (int i = 0; i < 3; i++) {
-        const trace_kernel kernel = i == 0 ? TRACE_TILE : TRACE_LIST;
+        const trace_kernel kernel = i == 0 ? TRACE_TREE : TRACE_LIST;
         s.packet_order = i == 2;
         pass_result *kept = run(&g, &s, &rays, kernel, 0), *again = run(&g, &s, &rays, kernel, 1);
         assert_true(kept->counters.tape_bytes > 1000 && again->counters.tape_bytes == 0);

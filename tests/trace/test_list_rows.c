@@ -14,11 +14,11 @@ static void steps_on_are_bounded(void **state)
 {
     (void)state;
     enum { COUNT = 500, LANE = 9 };
-    list_row row = {.color = {1, 0.5f, 0.25f}};
-    const used_list used = {.row = &row, .count = 1};
+    tile_gaussian gaussian = {.color = {1, 0.5f, 0.25f}};
+    const used_list used = {.gaussian = &gaussian, .count = 1};
     const vfloat16 one = vfloat16_set1(1), d_rgb[3] = {one, one, one};
     list_scratch scratch = {0};
-    list_rows rows = {0};
+    packet_hits rows = {0};
     assert_true(reserve_rows_of_list(&scratch, COUNT, true, &rows));
     for (int late = 0; late < 2; late++) {
         rows.count = COUNT;

@@ -507,6 +507,21 @@ static void rays_of_a_file(void **state)
     }
 }
 
+/* The limit of an origin is that of each coordinate. */
+static void sound_rays(void **state)
+{
+    (void)state;
+    static const struct {
+        float origin[3], dir[3];
+        bool sound;
+    } rows[] = {{{0, 0, 0}, {0, 0, 1}, true},         {{9e16f, -9e16f, 9e16f}, {0.6f, 0, -0.8f}, true},
+                {{0, -1.1e17f, 0}, {0, 0, 1}, false}, {{0, 0, NAN}, {0, 0, 1}, false},
+                {{0, 0, 0}, {0, 0, 0}, false},        {{0, 0, 0}, {0, 1.1f, 0}, false},
+                {{0, 0, 0}, {NAN, 0, 1}, false},      {{INFINITY, 0, 0}, {0, 0, 1}, false}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        assert_int_equal(ray_is_sound(rows[i].origin, rows[i].dir), rows[i].sound);
+}
+
 static void files_that_are_not_rays(void **state)
 {
     (void)state;
@@ -567,6 +582,7 @@ int main(void)
         cmocka_unit_test(bad_shots),
         cmocka_unit_test(memory_runs_out),
         cmocka_unit_test(rays_of_a_file),
+        cmocka_unit_test(sound_rays),
         cmocka_unit_test(files_that_are_not_rays),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);

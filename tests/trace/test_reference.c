@@ -401,11 +401,11 @@ static void gradients_agree_with_differences(void **state)
     size_t tested[CLASS_COUNT] = {0}, skipped = 0, near_hits = 0, cut_hits = 0, hit_total = 0;
     for (uint64_t seed = 0; seed < SCENES; seed++) {
         random_scene r;
-        float near = 0, through = 0.3f;
+        float near = 0, T_front = 0.3f;
         make_random(&r, seed);
         if (seed % 2 == 1) { /* something lies in front of them all */
             r.rays.near = &near;
-            r.rays.through = &through;
+            r.rays.T_front = &T_front;
         }
         const size_t n = r.scene.count;
         double *d = mem_calloc(n, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL);

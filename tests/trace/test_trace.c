@@ -539,7 +539,7 @@ static void faces_of_a_cube(void **state)
         assert_ok(image_alloc(&rgb, rays.width, rays.height, 3, NULL));
         assert_ok(trace_build(&scene, &g, &s, reach_of(&rays), NULL));
         assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb}, NULL, NULL));
-        assert_true(scene.listed && scene.lists.view.face_count == VIEW_FACES);
+        assert_true(scene.listed && scene.lists.view.face_count == LIST_FACES);
         image_free(&rgb);
         trace_scene_free(&scene);
         ray_image_free(&rays);
@@ -613,7 +613,7 @@ static void one_hundred_thousand_hits(void **state)
         assert_ok(reference_forward(&g, &s, &rays, rgb, &T, &blended, NULL));
         assert_int_equal(blended, count);
         assert_int_equal(t.counters.blended, count);
-        assert_int_equal(t.counters.spilled_packets, kernel == TRACE_TILE);
+        assert_int_equal(t.counters.spilled_packets, kernel == TRACE_TREE);
         for (int c = 0; c < 3; c++)
             assert_near((double)t.rgb.pixels[c], rgb[c], 1e-4); /* 10^5 additions in float32 */
         assert_near((double)t.T[0], T, 1e-4);
@@ -665,7 +665,7 @@ static void coincident_gaussians(void **state)
             assert_limits(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? &few : &many);
         else
             assert_figures(count == 150 ? "150 at once" : "800 at once", &f, count == 150 ? 1e-5 : 5e-5);
-        assert_int_equal(f.counters.spilled_packets, kernel == TRACE_TILE && count == 800 ? 12 : 0);
+        assert_int_equal(f.counters.spilled_packets, kernel == TRACE_TREE && count == 800 ? 12 : 0);
         ray_image_free(&rays);
         gaussians_free(&g);
     }
@@ -689,7 +689,7 @@ static void assert_copies(const char *name, const gaussians *g, const double cen
 static void copies_of_other_opacity(void **state)
 {
     (void)state;
-    if (kernel == TRACE_TILE)
+    if (kernel == TRACE_TREE)
         skip();
     for (size_t count = 3; count <= 300; count *= 10) {
         const float most = count < 300 ? 0.5f : 0.03f;
@@ -1200,7 +1200,7 @@ int main(void)
         cmocka_unit_test(peer_scene),
     };
     int failed = 0;
-    for (kernel = TRACE_LIST; kernel <= TRACE_TILE; kernel++) {
+    for (kernel = TRACE_LIST; kernel <= TRACE_TREE; kernel++) {
         print_message(kernel == TRACE_LIST ? "over lists\n" : "over the tree\n");
         failed += cmocka_run_group_tests(tests, NULL, NULL);
     }

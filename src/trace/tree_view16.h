@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view16.h -- Gaussians as seen from the common origin of a tile's rays, in the tile's frame: the form
-   of view_form16.h. Included by kernels after beam16.h. */
-#ifndef GBT_TRACE_VIEW16_H
-#define GBT_TRACE_VIEW16_H
+/* trace/tree_view16.h -- Gaussians as seen from the common origin of a tile's rays, in the tile's frame: the
+   form of view_form16.h. Included by kernels after tree_beam16.h. */
+#ifndef GBT_TRACE_TREE_VIEW16_H
+#define GBT_TRACE_TREE_VIEW16_H
 
-#include "trace/beam16.h"
+#include "trace/tree_beam16.h"
 #include "trace/view_form16.h"
 
 /* Rays of a packet in the tile's frame. */
@@ -95,11 +95,10 @@ static inline view_response view_respond(const view_gaussians *g, int i, const v
     return r;
 }
 
-/* 2^-120 is small enough: the least alpha_min that can be set is 1e-30. */
 static inline vfloat16 view_alpha(const view_gaussians *g, int i, vfloat16 exponent)
 {
     return vfloat16_mul(vfloat16_set1(g->field[VIEW_OPACITY][i]),
-                        vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(-120.0f))));
+                        vfloat16_exp2(vfloat16_max(exponent, vfloat16_set1(EXP2_LEAST))));
 }
 
 #endif

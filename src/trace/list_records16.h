@@ -1,25 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
+/* trace/list_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
    be hit.
 
    With kappa = c / R^2, c the d2 where the response falls to alpha_min, a ray is hit where y <= lambda w1^2,
    lambda = kappa / (1 - kappa): an ellipse in (a, b) when all of the ellipsoid lies ahead. With p = q1 q4 -
    q2 q3, P = p^2 + q1^2 q5^2 and S = q3^2 q5^2 its determinant is D = S - lambda P, and everything else is
    made of sums that do not cancel while lambda P <= 3/4 S. Included by list_kernel.inc.h. */
-#ifndef GBT_TRACE_VIEW_RECORDS16_H
-#define GBT_TRACE_VIEW_RECORDS16_H
+#ifndef GBT_TRACE_LIST_RECORDS16_H
+#define GBT_TRACE_LIST_RECORDS16_H
 
 #include "trace/list_view.h"
+#include "trace/rays.h"
 #include "trace/view_form16.h"
 
 /* Means of sixteen Gaussians in the axes of the view. In double, so that slopes have the digits of the
    coordinates. */
-typedef struct view_means {
+typedef struct list_means {
     double a[16], b[16];
     _Alignas(64) float slope[2][16], at[3][16];
-} view_means;
+} list_means;
 
-static inline void place_means(const gaussians *g, const view_frame *frame, size_t first, view_means *out)
+static inline void place_means(const gaussians *g, const list_frame *frame, size_t first, list_means *out)
 {
     const double(*dual)[3] = frame->dual, *o = frame->origin;
     for (int i = 0; i < 16; i++) {
@@ -39,7 +40,8 @@ static inline void place_means(const gaussians *g, const view_frame *frame, size
     }
 }
 
-/* Which of sixteen can be seen at all: the rule of bvh/proxy.c. */
+/* Which of sixteen can be seen at all: a coarser form of the rule of bvh/proxy.c, with one bound on the
+   extent in place of three extents. */
 static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians *g, size_t first, size_t end)
 {
     unsigned bits = 0;
@@ -53,13 +55,21 @@ static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians 
         if (g->opacity[at] <= scene->settings.alpha_min)
             continue;
         const bool sound = isfinite(g->opacity[at]) && g->scale_x[at] > 0 && g->scale_y[at] > 0 &&
-                           g->scale_z[at] > 0 && isfinite(color) && reach < 1e17f; /* false for NaN too */
+                           g->scale_z[at] > 0 && isfinite(color) &&
+                           reach < (float)RAY_ORIGIN_LIMIT; /* false for NaN too */
         bits |= (unsigned)sound << i;
     }
     return bits;
 }
 
-/* d2 where sixteen Gaussians end, and a little more than rounding of alpha can change. */
+/* A d2 and a hundred times what rounding takes of it: about 2^-20 of d2 = R^2 y / den, and 2^-22 of alpha,
+   which is 5e-7 of 2 ln alpha. */
+static inline vfloat16 open_square(vfloat16 square)
+{
+    return vfloat16_fma(square, vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
+}
+
+/* d2 where sixteen Gaussians end, opened for rounding. */
 static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opacity, unsigned lanes)
 {
     _Alignas(64) float cut[16] = {0};
@@ -67,7 +77,7 @@ static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opaci
     for (int i = 0; i < 16; i++)
         if (lanes >> i & 1)
             cut[i] = smaller(2 * logf(opacity[i] / scene->settings.alpha_min), radius2);
-    return vfloat16_fma(vfloat16_load(cut), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
+    return open_square(vfloat16_load(cut));
 }
 
 /* The same of opacity 1, or of their own if that is more. */
@@ -75,12 +85,11 @@ static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
 {
     const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius,
                 whole = smaller(2 * logf(1 / scene->settings.alpha_min), radius2);
-    return vfloat16_max(cut,
-                        vfloat16_fma(vfloat16_set1(whole), vfloat16_set1(1.0001f), vfloat16_set1(2e-5f)));
+    return vfloat16_max(cut, open_square(vfloat16_set1(whole)));
 }
 
 typedef struct outline_lanes {
-    vfloat16 field[8]; /* of view_outline */
+    vfloat16 field[8]; /* of list_outline */
     vmask16 holds;     /* the form holds; the others need their ellipsoids */
 } outline_lanes;
 
@@ -99,6 +108,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     const vfloat16 A = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[0]), q33),
                    B = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[1]), vfloat16_mul(q[2], q[3])),
                    C = vfloat16_div(vfloat16_fma(B, B, D), A);
+    /* 1.001: D >= S / 4, so that D has lost three bits at most, and all roundings come to about 1e-5. */
     const vfloat16 inverse = vfloat16_div(one, D), share = vfloat16_mul(lambda, inverse),
                    G = vfloat16_mul(S, inverse),
                    s = vfloat16_mul(vfloat16_mul(lambda, vfloat16_set1(1.001f)), G);
@@ -113,6 +123,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     o.field[7] = kappa;
     const vfloat16 w1_most = vfloat16_add(G, vfloat16_sqrt(vfloat16_mul(share, vfloat16_mul(G, P)))),
                    nearest = vfloat16_div(vfloat16_mul(depth, vfloat16_sub(one, kappa)), w1_most);
+    /* 1.001: no hit is so near that rounding could cut it at t_near. */
     const vmask16 ahead =
         vmask16_and(vfloat16_lt(vfloat16_set1(1.001f * scene->settings.t_near), nearest),
                     vmask16_and(vfloat16_lt(vfloat16_set1(0), depth), vfloat16_lt(vfloat16_set1(0), D)));
@@ -133,7 +144,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
 
 /* Covariances of sixteen ellipsoids in the axes of the view: k^2 times the sum of the scaled axes' squares.
  */
-static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *frame, const float at[3][16],
+static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *frame, const float at[3][16],
                                    vfloat16 cut, vfloat16 out[8])
 {
     vfloat16 axis[3][3];
@@ -154,6 +165,8 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *fr
     out[5] = vfloat16_mul(cut, dot16(axis[2], axis[2]));
     out[6] = vfloat16_mul(cut, dot16(axis[0], axis[2]));
     out[7] = vfloat16_mul(cut, dot16(axis[1], axis[2]));
+    /* Twenty roundings or so, 2^-21 together; ellipsoid_meets_box() sees 1 + slope^2 times that, 11 at most
+     */
     const vfloat16 slack =
         vfloat16_mul(vfloat16_set1(0x1p-17f), vfloat16_add(out[3], vfloat16_add(out[4], out[5])));
     for (int k = 3; k < 6; k++)
@@ -164,8 +177,8 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const view_frame *fr
 static void find_reached(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block)
 {
     const vfloat16 one = vfloat16_set1(1);
-    const size_t begin = block * VIEW_GRAIN,
-                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    const size_t begin = block * LIST_GRAIN,
+                 end = begin + LIST_GRAIN < g->count ? begin + LIST_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible = visible_lanes(scene, g, first, end);
         uint32_t id[16];
@@ -187,7 +200,7 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
                            vfloat16_set1(1e-5f), far,
                            vfloat16_mul(vfloat16_set1(1.001f), vfloat16_sqrt(vfloat16_div(cut, thinnest))));
         for (int f = 0; f < view->face_count; f++) {
-            const view_face *face = &view->face[f];
+            const list_face *face = &view->face[f];
             const float(*axis)[3] = face->frame.axis;
             const vfloat16 depth = dot_lanes(axis[2], from);
             vmask16 out = vfloat16_lt(vfloat16_add(depth, radius), vfloat16_set1(0));
@@ -203,87 +216,106 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
             }
             const unsigned bits = face->part_count > 0 ? visible & ~vmask16_bits(out) : 0;
             const size_t entry = (size_t)f * view->block_count + block;
-            view->reached[entry * (VIEW_GRAIN / 16) + (first - begin) / 16] = (uint16_t)bits;
+            view->reached[entry * (LIST_GRAIN / 16) + (first - begin) / 16] = (uint16_t)bits;
             view->kept[entry].records += (uint32_t)__builtin_popcount(bits);
         }
     }
 }
 
-static view_kept make_records(const kernel_scene *scene, const gaussians *g, const view_face *face,
-                              size_t block, const uint16_t *reached, view_record *records, view_shape *shapes)
+/* What sixteen Gaussians are in the axes of a face. */
+typedef struct record_lanes {
+    list_means means;
+    _Alignas(64) float q[5][16], falloff[16], outline[8][16], ellipsoid[8][16]; /* fields of list_shape */
+    unsigned holds; /* bit per Gaussian: its form holds, and it has an outline; else, an ellipsoid */
+    unsigned kept;  /* whose outlines meet the bounds of the face, and all ellipsoids */
+} record_lanes;
+
+static inline void measure_sixteen(const kernel_scene *scene, const gaussians *g, const list_face *face,
+                                   size_t first, size_t end, unsigned visible, record_lanes *out)
 {
-    uint32_t count = 0, general = 0;
-    const view_frame *frame = &face->frame;
     const slope_box *bounds = &face->bounds;
-    const vfloat16 low[2] = {vfloat16_set1(bounds->low[0]), vfloat16_set1(bounds->low[1])},
-                   high[2] = {vfloat16_set1(bounds->high[0]), vfloat16_set1(bounds->high[1])};
-    const size_t begin = block * VIEW_GRAIN,
-                 end = begin + VIEW_GRAIN < g->count ? begin + VIEW_GRAIN : g->count;
+    uint32_t id[16];
+    view_form form;
+    for (unsigned i = 0; i < 16; i++)
+        id[i] = (uint32_t)(first + i < end ? first + i : first);
+    const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
+    place_means(g, &face->frame, first, &out->means);
+    const vfloat16 slope[2] = {vfloat16_load(out->means.slope[0]), vfloat16_load(out->means.slope[1])},
+                   depth = vfloat16_load(out->means.at[2]);
+    view_form_find(face->frame.axis, &lanes, slope[0], slope[1], depth, &form);
+    const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
+    const outline_lanes outline = find_outlines(scene, &form, depth, cut);
+    /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ in
+       rounding, and so would their order from ray to ray. */
+    const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
+    out->holds = vmask16_bits(whole) & visible;
+    vmask16 inside = vmask16_from_bits(out->holds);
+    for (int k = 0; k < 2; k++) {
+        const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];
+        inside = vmask16_and(
+            inside, vmask16_and(vfloat16_le(vfloat16_sub(middle, half), vfloat16_set1(bounds->high[k])),
+                                vfloat16_le(vfloat16_set1(bounds->low[k]), vfloat16_add(middle, half))));
+    }
+    out->kept = vmask16_bits(inside) | (visible & ~out->holds);
+    for (int k = 0; k < 5; k++)
+        vfloat16_store(out->q[k], form.q[k]);
+    vfloat16_store(out->falloff, form.falloff);
+    for (int k = 0; k < 8; k++)
+        vfloat16_store(out->outline[k], outline.field[k]);
+    if (out->holds != visible) {
+        vfloat16 field[8];
+        find_ellipsoids(&lanes, &face->frame, (const float(*)[16])out->means.at, cut, field);
+        for (int k = 0; k < 8; k++)
+            vfloat16_store(out->ellipsoid[k], field[k]);
+    }
+}
+
+/* That of lane `i`, which is Gaussian `id`. False when its ellipsoid misses the bounds. */
+static inline bool write_record(const gaussians *g, const slope_box *bounds, const record_lanes *m, int i,
+                                size_t id, list_record *record, list_shape *shape)
+{
+    const bool holds = (m->holds >> i & 1) != 0;
+    const float(*field)[16] = holds ? m->outline : m->ellipsoid;
+    float eight[8];
+    for (int k = 0; k < 8; k++)
+        eight[k] = field[k][i];
+    memcpy(shape, eight, sizeof eight);
+    if (!holds && !ellipsoid_meets_box(&shape->ellipsoid, bounds))
+        return false;
+    *record = (list_record){.a = m->means.a[i],
+                            .b = m->means.b[i],
+                            .q = {m->q[0][i], m->q[1][i], m->q[2][i], m->q[3][i], m->q[4][i]},
+                            .depth = m->means.at[2][i],
+                            .falloff = m->falloff[i],
+                            .opacity = g->opacity[id],
+                            .color = {g->red[id], g->green[id], g->blue[id]},
+                            .id = (uint32_t)id | (holds ? 0 : RECORD_GENERAL)};
+    return true;
+}
+
+static list_kept make_records(const kernel_scene *scene, const gaussians *g, const list_face *face,
+                              size_t block, const uint16_t *reached, list_record *records, list_shape *shapes)
+{
+    list_kept kept = {0};
+    const size_t begin = block * LIST_GRAIN,
+                 end = begin + LIST_GRAIN < g->count ? begin + LIST_GRAIN : g->count;
     for (size_t first = begin; first < end; first += 16) {
         const unsigned visible =
             reached != NULL ? reached[(first - begin) / 16] : visible_lanes(scene, g, first, end);
+        record_lanes m;
         if (visible == 0)
             continue;
-        uint32_t id[16];
-        view_means means;
-        view_form form;
-        for (unsigned i = 0; i < 16; i++)
-            id[i] = (uint32_t)(first + i < end ? first + i : first);
-        const gaussian_lanes lanes = load_gaussians(scene, id, NULL);
-        place_means(g, frame, first, &means);
-        const vfloat16 slope[2] = {vfloat16_load(means.slope[0]), vfloat16_load(means.slope[1])},
-                       depth = vfloat16_load(means.at[2]);
-        view_form_find(frame->axis, &lanes, slope[0], slope[1], depth, &form);
-        const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
-        const outline_lanes outline = find_outlines(scene, &form, depth, cut);
-        /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ
-           in rounding, and so would their order from ray to ray. */
-        const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
-        const unsigned holds = vmask16_bits(whole) & visible;
-        vmask16 inside = vmask16_from_bits(holds);
-        for (int k = 0; k < 2; k++) {
-            const vfloat16 middle = vfloat16_add(slope[k], outline.field[k]), half = outline.field[5 + k];
-            inside = vmask16_and(inside, vmask16_and(vfloat16_le(vfloat16_sub(middle, half), high[k]),
-                                                     vfloat16_le(low[k], vfloat16_add(middle, half))));
-        }
-        unsigned kept = vmask16_bits(inside);
-        _Alignas(64) float q[5][16], falloff[16], shape[8][16], round[8][16];
-        for (int k = 0; k < 5; k++)
-            vfloat16_store(q[k], form.q[k]);
-        vfloat16_store(falloff, form.falloff);
-        for (int k = 0; k < 8; k++)
-            vfloat16_store(shape[k], outline.field[k]);
-        if (holds != visible) {
-            vfloat16 field[8];
-            find_ellipsoids(&lanes, frame, (const float(*)[16])means.at, cut, field);
-            for (int k = 0; k < 8; k++)
-                vfloat16_store(round[k], field[k]);
-            kept |= visible & ~holds;
-        }
-        for (; kept != 0; kept &= kept - 1) {
-            const int i = __builtin_ctz(kept);
-            const size_t at = first + (size_t)i;
-            const bool front = (holds >> i & 1) != 0;
-            const float(*field)[16] = front ? (const float(*)[16])shape : (const float(*)[16])round;
-            float eight[8];
-            for (int k = 0; k < 8; k++)
-                eight[k] = field[k][i];
-            memcpy(&shapes[count], eight, sizeof eight);
-            if (!front && !ellipsoid_meets_box(&shapes[count].ellipsoid, bounds))
+        measure_sixteen(scene, g, face, first, end, visible, &m);
+        for (unsigned rest = m.kept; rest != 0; rest &= rest - 1) {
+            const int i = __builtin_ctz(rest);
+            list_record *record = &records[kept.records];
+            if (!write_record(g, &face->bounds, &m, i, first + (size_t)i, record, &shapes[kept.records]))
                 continue;
-            records[count] = (view_record){.a = means.a[i],
-                                           .b = means.b[i],
-                                           .q = {q[0][i], q[1][i], q[2][i], q[3][i], q[4][i]},
-                                           .depth = means.at[2][i],
-                                           .falloff = falloff[i],
-                                           .opacity = g->opacity[at],
-                                           .color = {g->red[at], g->green[at], g->blue[at]},
-                                           .id = (uint32_t)at | (front ? 0 : RECORD_GENERAL)};
-            general += !front;
-            count++;
+            kept.general += record_is_general(record);
+            kept.records++;
         }
     }
-    return (view_kept){.records = count, .general = general};
+    return kept;
 }
 
 #endif

@@ -1,21 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and blended.
+/* trace/tree_rows16.h -- rows: hits of one Gaussian on the sixteen rays of a packet; put in order and
+   blended.
 
    Nothing is sorted per ray. Rows are put in the order of their nearest depth; then, on every ray, the
    transmittance in front of a hit is the product over the rows that end before this row begins (one running
    product for all of them) times the product over the few rows whose depths overlap with it, compared one by
    one:
 
-       T_i = T Q[first_i] prod { 1 - alpha_j : first_i <= j < last_i, t_j before t_i }
+       T_i = T_front[first_i] prod { 1 - alpha_j : first_i <= j < last_i, t_j before t_i }
 
    Exact order by t_c at the price of one comparison and one masked multiplication per overlapping pair,
    without keys, gathers or scatters.
    Equal depths: the row order decides, which is the order of indices for Gaussians of one shape, place and
    opacity and for depths cut at t_near. Included by kernels after simd16.h. */
-#ifndef GBT_TRACE_ROWS16_H
-#define GBT_TRACE_ROWS16_H
+#ifndef GBT_TRACE_TREE_ROWS16_H
+#define GBT_TRACE_TREE_ROWS16_H
 
 #include "trace/packet_extra16.h"
+#include "trace/row16.h"
 
 enum { ROW_CAPACITY = 512, ROW_BLOCK = 4 /* rows whose windows are walked together */ };
 
@@ -35,7 +37,7 @@ typedef struct packet_rows {
    last, so that blocks are whole. */
 typedef struct sorted_rows {
     float *t, *clear;          /* depth, infinity where there is no hit; 1 - alpha, 1 there */
-    float *before;             /* Q: transmittance in front of row i if all rows before it were in front */
+    float *T_front;            /* T in front of row i if all rows before it were in front */
     float *near, *far_reached; /* one number per row: nearest depth; largest depth of rows 0..i */
     int count;
 } sorted_rows;
@@ -45,16 +47,6 @@ typedef struct sorted_rows {
 typedef struct row_window {
     int low, high;
 } row_window;
-
-static inline vfloat16 row_load(const float *rows, int i)
-{
-    return vfloat16_load(rows + (size_t)i * PACKET_LANES);
-}
-
-static inline void row_store(float *rows, int i, vfloat16 a)
-{
-    vfloat16_store(rows + (size_t)i * PACKET_LANES, a);
-}
 
 /* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none;
    returned is the nearest of all. */
@@ -83,7 +75,7 @@ static inline void place_row(sorted_rows *o, int i, vfloat16 t, vfloat16 clear, 
 {
     row_store(o->t, i, t);
     row_store(o->clear, i, clear);
-    row_store(o->before, i, *product);
+    row_store(o->T_front, i, *product);
     *product = vfloat16_mul(*product, clear);
     *reached = larger(*reached, far);
     o->near[i] = near;
@@ -116,7 +108,7 @@ static inline void window_transmittance(const sorted_rows *o, int first, const r
 {
     vfloat16 t[ROW_BLOCK];
     for (int k = 0; k < ROW_BLOCK; k++) {
-        T[k] = row_load(o->before, w->low);
+        T[k] = row_load(o->T_front, w->low);
         t[k] = row_load(o->t, first + k);
     }
     for (int j = w->low; j < first; j++) {
@@ -172,7 +164,7 @@ static inline void window_behind(const sorted_rows *o, int first, const row_wind
 typedef struct round_rows {
     _Alignas(64) float t[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES],
         clear[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
-    _Alignas(64) float before[ROW_CAPACITY * PACKET_LANES];
+    _Alignas(64) float T_front[ROW_CAPACITY * PACKET_LANES];
     _Alignas(64) float row_near[ROW_CAPACITY], row_far[ROW_CAPACITY]; /* in the packet's own order of rows */
     _Alignas(64) float key[ROW_CAPACITY];
     float near[ROW_CAPACITY + ROW_BLOCK], far_reached[ROW_CAPACITY];
@@ -218,7 +210,7 @@ static inline void order_rows(const packet_rows *p, float horizon, round_rows *o
         o->key[n] = o->row_near[i];
         n += o->row_near[i] < horizon;
     }
-    o->sorted = (sorted_rows){o->t, o->clear, o->before, o->near, o->far_reached, n};
+    o->sorted = (sorted_rows){o->t, o->clear, o->T_front, o->near, o->far_reached, n};
     const bool tied = rank_keys(o->key, n, o->row);
     for (int i = 0; i < n; i++)
         o->row[i] = rows[o->row[i]];

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_faces.h -- the faces of a view and their parts (list_view.h), from its rays. */
-#ifndef GBT_TRACE_VIEW_FACES_H
-#define GBT_TRACE_VIEW_FACES_H
+/* trace/list_faces.h -- the faces of a view and their parts (list_view.h), from its rays. */
+#ifndef GBT_TRACE_LIST_FACES_H
+#define GBT_TRACE_LIST_FACES_H
 
 #include "trace/rays.h"
-#include "trace/view_lists.h"
+#include "trace/list_build.h"
 
 /**
  * Set faces, parts and boxes of `lists->view`.
@@ -13,6 +13,6 @@
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; the same for every thread count.
  */
-gbt_status view_faces_make(view_lists *lists, const ray_image *rays, bool *usable, gbt_error *err);
+gbt_status list_faces_make(list_builder *lists, const ray_image *rays, bool *usable, gbt_error *err);
 
 #endif

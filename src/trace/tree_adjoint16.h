@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and the
-   colour to the front, and add every Gaussian's sums to its record. Included by tile_kernel.inc.h.
+/* trace/tree_adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and
+   the colour to the front, and add every Gaussian's sums to its record. Included by tree_kernel.inc.h.
    docs/tracing.md has the formulas. */
-#ifndef GBT_TRACE_ADJOINT16_H
-#define GBT_TRACE_ADJOINT16_H
+#ifndef GBT_TRACE_TREE_ADJOINT16_H
+#define GBT_TRACE_TREE_ADJOINT16_H
 
-#include "trace/beam16.h"
+#include "trace/tree_beam16.h"
 #include "trace/gaussian16.h"
-#include "trace/kernel.h"
-#include "trace/rows16.h"
-#include "trace/view16.h"
+#include "trace/tree_kernel.h"
+#include "trace/tree_rows16.h"
+#include "trace/tree_view16.h"
 
 /* What one hit, or the sixteen of a row, add to a Gaussian's record. */
 static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weight, const vfloat16 v_in[3],
@@ -23,14 +23,14 @@ static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weigh
     vfloat16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
     for (int k = 0; k < 3; k++)
         v[k] = vfloat16_select(blended, v_in[k], zero);
-    const vfloat16 d_d2 = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw));
-    vfloat16 g[3];
+    const vfloat16 h = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw)); /* dL/d(d2) */
+    vfloat16 hv[3];
     for (int k = 0; k < 3; k++) {
-        terms[GRADIENT_V + k] = g[k] = vfloat16_mul(d_d2, v[k]);
-        terms[GRADIENT_VV + k] = vfloat16_mul(g[k], v[k]);
+        terms[GRADIENT_V + k] = hv[k] = vfloat16_mul(h, v[k]);
+        terms[GRADIENT_VV + k] = vfloat16_mul(hv[k], v[k]);
     }
-    terms[GRADIENT_VV + 3] = vfloat16_mul(g[1], v[2]), terms[GRADIENT_VV + 4] = vfloat16_mul(g[2], v[0]),
-                        terms[GRADIENT_VV + 5] = vfloat16_mul(g[0], v[1]);
+    terms[GRADIENT_VV + 3] = vfloat16_mul(hv[1], v[2]), terms[GRADIENT_VV + 4] = vfloat16_mul(hv[2], v[0]),
+                        terms[GRADIENT_VV + 5] = vfloat16_mul(hv[0], v[1]);
     terms[GRADIENT_OPACITY] = vfloat16_div(vfloat16_mul(raw, d_raw), opacity);
     for (int c = 0; c < 3; c++)
         terms[GRADIENT_COLOR + c] = vfloat16_mul(weight, d_rgb[c]);
@@ -79,7 +79,7 @@ typedef struct adjoint_rows {
     sorted_rows sorted;
 } adjoint_rows;
 
-static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
+static bool reserve_rows(int count, tree_scratch *scratch, adjoint_rows *out)
 {
     const size_t n = ((size_t)count + 16 + ROW_BLOCK) & ~(size_t)15, wide = n * PACKET_LANES,
                  groups = n / 16 * (sizeof(adjoint_group) / sizeof(float));
@@ -92,7 +92,7 @@ static bool reserve_rows(int count, kernel_scratch *scratch, adjoint_rows *out)
     for (int f = 0; f < FIELD_COUNT; f++, at += wide)
         out->field[f] = at;
     out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide,
-    out->sorted.before = at + 4 * wide;
+    out->sorted.T_front = at + 4 * wide;
     at += 5 * wide;
     out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n,
     out->row_far = at + 3 * n, out->row = (uint32_t *)(void *)(at + 4 * n);
@@ -230,69 +230,87 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
     return add_turned(entry + first, o->sorted.count - first, turned, out);
 }
 
-/*   dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
+/* T alpha of every row, T c.g, and their product, the term. */
+static void weigh_rows(vfloat16 alpha_max, adjoint_rows *o)
+{
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const int count = o->sorted.count;
+    row_window window = {0};
+    for (int first = 0; first < count; first += ROW_BLOCK) {
+        vfloat16 T[ROW_BLOCK];
+        move_window(&o->sorted, first, &window);
+        window_transmittance(&o->sorted, first, &window, T);
+        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
+            const int row = (int)o->row[first + k];
+            const vmask16 blended = vfloat16_lt(row_load(o->sorted.t, first + k), infinite);
+            const vfloat16 alpha = vfloat16_min(row_load(o->field[FIELD_RAW], row), alpha_max);
+            const vfloat16 weight = vfloat16_mul(T[k], vfloat16_select(blended, alpha, zero));
+            const vfloat16 color = row_load(o->field[FIELD_COLOR], row);
+            row_store(o->field[FIELD_WEIGHT], row, weight);
+            row_store(o->field[FIELD_COLOR], row, vfloat16_mul(T[k], color));
+            row_store(o->term, first + k, vfloat16_mul(weight, color));
+        }
+    }
+}
+
+/* The sum of the terms of every row and those after it, with what is `behind` all. */
+static void sum_terms(vfloat16 behind, adjoint_rows *o)
+{
+    const int count = o->sorted.count;
+    for (int i = count; i < count + ROW_BLOCK; i++)
+        row_store(o->term, i, vfloat16_set1(0));
+    row_store(o->after, count, behind);
+    for (int i = count; i-- > 0;)
+        row_store(o->after, i, behind = vfloat16_add(behind, row_load(o->term, i)));
+}
+
+/* The sums of every row over its rays, with
+       dL/dalpha_i = T_i c_i.g - (sum of w_j c_j.g behind i, with the background) / (1 - alpha_i)   */
+static void sum_rays(const kernel_scene *scene, const tape_entry *entry, const vfloat16 d_rgb[3],
+                     vfloat16 alpha_max, adjoint_rows *o)
+{
+    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const int count = o->sorted.count;
+    row_window window = {0};
+    for (int first = 0; first < count; first += ROW_BLOCK) {
+        vfloat16 sum[ROW_BLOCK];
+        move_window(&o->sorted, first, &window);
+        window_behind(&o->sorted, first, &window, o->term, o->after, sum);
+        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
+            const int row = (int)o->row[first + k];
+            const vmask16 blended = vfloat16_lt(row_load(o->sorted.t, first + k), infinite);
+            const vfloat16 share = vfloat16_div(sum[k], row_load(o->sorted.clear, first + k)),
+                           d_alpha = vfloat16_sub(row_load(o->field[FIELD_COLOR], row), share);
+            const vfloat16 v[3] = {row_load(o->field[FIELD_V], row), row_load(o->field[FIELD_V + 1], row),
+                                   row_load(o->field[FIELD_V + 2], row)};
+            const float *record = scene->records + (size_t)entry[row].id * RECORD_FLOATS;
+            vfloat16 terms[16];
+            gradient_terms(vfloat16_select(blended, d_alpha, zero), row_load(o->field[FIELD_RAW], row),
+                           row_load(o->field[FIELD_WEIGHT], row), v, vfloat16_set1(record[RECORD_OPACITY]),
+                           alpha_max, d_rgb, terms);
+            row_store(o->field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
+        }
+    }
+}
+
 static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, const tile_beam *beam,
                            const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                           gradient_list *out, kernel_scratch *scratch)
+                           gradient_list *out, tree_scratch *scratch)
 {
     adjoint_rows o;
     if (!reserve_rows(count, scratch, &o))
         return false;
-    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max), infinite = vfloat16_set1(INFINITY),
-                   zero = vfloat16_set1(0);
+    const vfloat16 alpha_max = vfloat16_set1(scene->settings.alpha_max);
     vfloat16 d_rgb[3], behind_all[3];
     for (int c = 0; c < 3; c++) {
         d_rgb[c] = vfloat16_load(d_rgb_in[c]);
         behind_all[c] = vfloat16_load(rays->background[c]);
     }
     replay_rows(scene, rays, beam, entry, d_rgb, &o);
-    const vfloat16 transmittance = sort_rows(entry, &o);
-    row_window window = {0};
-    for (int first = 0; first < count; first += ROW_BLOCK) {
-        vfloat16 T[ROW_BLOCK];
-        move_window(&o.sorted, first, &window);
-        window_transmittance(&o.sorted, first, &window, T);
-        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
-            const int row = (int)o.row[first + k];
-            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
-            const vfloat16 weight = vfloat16_mul(
-                T[k],
-                vfloat16_select(blended, vfloat16_min(row_load(o.field[FIELD_RAW], row), alpha_max), zero));
-            const vfloat16 color = row_load(o.field[FIELD_COLOR], row);
-            row_store(o.field[FIELD_WEIGHT], row, weight);
-            row_store(o.field[FIELD_COLOR], row, vfloat16_mul(T[k], color));
-            row_store(o.term, first + k, vfloat16_mul(weight, color));
-        }
-    }
-    for (int i = count; i < count + ROW_BLOCK; i++)
-        row_store(o.term, i, zero);
-    vfloat16 behind = vfloat16_mul(dot16(behind_all, d_rgb), transmittance);
-    row_store(o.after, count, behind);
-    for (int i = count; i-- > 0;)
-        row_store(o.after, i, behind = vfloat16_add(behind, row_load(o.term, i)));
-    window = (row_window){0};
-    for (int first = 0; first < count; first += ROW_BLOCK) {
-        vfloat16 sum[ROW_BLOCK];
-        move_window(&o.sorted, first, &window);
-        window_behind(&o.sorted, first, &window, o.term, o.after, sum);
-        for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
-            const int row = (int)o.row[first + k];
-            const vmask16 blended = vfloat16_lt(row_load(o.sorted.t, first + k), infinite);
-            const vfloat16 d_alpha =
-                vfloat16_select(blended,
-                                vfloat16_sub(row_load(o.field[FIELD_COLOR], row),
-                                             vfloat16_div(sum[k], row_load(o.sorted.clear, first + k))),
-                                zero);
-            const vfloat16 v[3] = {row_load(o.field[FIELD_V], row), row_load(o.field[FIELD_V + 1], row),
-                                   row_load(o.field[FIELD_V + 2], row)};
-            vfloat16 terms[16];
-            gradient_terms(
-                d_alpha, row_load(o.field[FIELD_RAW], row), row_load(o.field[FIELD_WEIGHT], row), v,
-                vfloat16_set1(scene->records[(size_t)entry[row].id * RECORD_FLOATS + RECORD_OPACITY]),
-                alpha_max, d_rgb, terms);
-            row_store(o.field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
-        }
-    }
+    const vfloat16 T_left = sort_rows(entry, &o);
+    weigh_rows(alpha_max, &o);
+    sum_terms(vfloat16_mul(dot16(behind_all, d_rgb), T_left), &o);
+    sum_rays(scene, entry, d_rgb, alpha_max, &o);
     for (int first = 0; first < count; first += 16)
         if (!add_rows(entry, &o, first, out))
             return false;
@@ -303,7 +321,7 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
    one operation; the rest is done for sixteen. */
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
-                        gradient_list *out, kernel_scratch *scratch)
+                        gradient_list *out, tree_scratch *scratch)
 {
     enum { RAW, V, COLOR = V + 3, OPACITY, CLEAR, TERM, T, BEHIND, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
@@ -338,9 +356,9 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         vfloat16_store(field[TERM] + first, vfloat16_mul(alpha, shown));
     }
     const float *clear = field[CLEAR], *term = field[TERM];
-    float *T_before = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
+    float *T_front = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
     for (int i = 0; i < count; i++) {
-        T_before[i] = transmittance;
+        T_front[i] = transmittance;
         transmittance *= clear[i];
     }
     for (int c = 0; c < 3; c++)
@@ -353,10 +371,10 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
         vfloat16 v[3], terms[16];
         for (int k = 0; k < 3; k++)
             v[k] = vfloat16_load(field[V + k] + first);
-        const vfloat16 raw = vfloat16_load(field[RAW] + first), before = vfloat16_load(field[T] + first),
-                       weight = vfloat16_mul(before, vfloat16_min(raw, alpha_max)),
-                       d_alpha = vfloat16_mul(before, vfloat16_sub(vfloat16_load(field[COLOR] + first),
-                                                                   vfloat16_load(field[BEHIND] + first)));
+        const vfloat16 raw = vfloat16_load(field[RAW] + first), front = vfloat16_load(field[T] + first),
+                       weight = vfloat16_mul(front, vfloat16_min(raw, alpha_max)),
+                       d_alpha = vfloat16_mul(front, vfloat16_sub(vfloat16_load(field[COLOR] + first),
+                                                                  vfloat16_load(field[BEHIND] + first)));
         gradient_terms(d_alpha, raw, weight, v, vfloat16_load(field[OPACITY] + first), alpha_max, d_rgb,
                        terms);
         if (!add_turned(entry + first, count - first, terms, out))
@@ -383,7 +401,7 @@ static __attribute__((noinline)) size_t count_entries(const tape_entry *entry, s
 
 static bool backward(const kernel_scene *scene, const tile_rays *tile,
                      float d_rgb[TILE_PACKETS][3][PACKET_LANES], const tape_entry *entry, gradient_list *out,
-                     kernel_scratch *scratch)
+                     tree_scratch *scratch)
 {
     const packet_rays *rays = tile->packet;
     size_t of_packet[TILE_PACKETS] = {0};

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they touch.
-   Conservative, never exact.
+/* trace/tree_beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they
+   touch. Conservative, never exact.
 
    Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray
    is a + s (slope_u, slope_v, 1); a beam is the four planes that hold all of its rays. Included by
-   tile_kernel.inc.h. */
-#ifndef GBT_TRACE_BEAM16_H
-#define GBT_TRACE_BEAM16_H
+   tree_kernel.inc.h. */
+#ifndef GBT_TRACE_TREE_BEAM16_H
+#define GBT_TRACE_TREE_BEAM16_H
 
 #include <float.h>
 #include <math.h>
@@ -122,8 +122,8 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
 {
     if (!make_frame(rays, out))
         return false;
-    /* Every bound is opened by what rounding could have taken: a few ulps of the slopes and of the largest
-       coordinate. */
+    /* Every bound is opened by more than rounding could have taken: 8 roundings of the slopes and 16 of the
+       largest coordinate. */
     const float slack = 0x1p-20f * scene->coordinate_max;
     float slope[4] = {FLT_MAX, -FLT_MAX, FLT_MAX, -FLT_MAX}; /* of the whole tile */
     float forward_low = FLT_MAX, forward_high = 0, start_low = FLT_MAX, start_high = -FLT_MAX;
@@ -229,6 +229,8 @@ static inline void turn_ellipsoids(const tree_leaf *leaf, const tile_beam *b, el
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(b->origin[axis]));
     for (int k = 0; k < 6; k++)
         s[k] = vfloat16_load(leaf->spread[k]);
+    /* About ten roundings, 2^-22 together; test_ellipsoids() sees them times 1 + slope^2, 11 at most
+       (make_beam). */
     const vfloat16 slack =
         vfloat16_mul(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])));
     out->u = dot_lanes(b->axis[0], offset);
@@ -262,6 +264,7 @@ static inline unsigned test_ellipsoids(const packet_beam *b, const ellipsoids16 
 /* A lower bound of t_c on every ray of the tile that hits. */
 static inline vfloat16 ellipsoid_nearest(const ellipsoids16 *e, const tile_beam *b, float t_near)
 {
+    /* 1.0001: for the rounding of ww and of the root */
     const vfloat16 nearest = vfloat16_fnma(vfloat16_sqrt(e->ww), vfloat16_set1(1.0001f), e->w);
     return vfloat16_max(
         vfloat16_mul(vfloat16_sub(nearest, vfloat16_set1(b->frame_start)), vfloat16_set1(b->depth_scale)),

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run together,
-   and for packets whose hits do not fit. No limit but memory. Included by tile_kernel.inc.h. */
-#ifndef GBT_TRACE_RAY16_H
-#define GBT_TRACE_RAY16_H
+/* trace/tree_ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run
+   together, and for packets whose hits do not fit. No limit but memory. Included by tree_kernel.inc.h. */
+#ifndef GBT_TRACE_TREE_RAY16_H
+#define GBT_TRACE_TREE_RAY16_H
 
-#include "trace/beam16.h"
+#include "trace/tree_beam16.h"
 #include "trace/gaussian16.h"
-#include "trace/heap.h"
-#include "trace/kernel.h"
+#include "trace/tree_heap.h"
+#include "trace/tree_kernel.h"
 #include "trace/ray_hits.h"
 
 enum { RAY_ROUND = 80 };
@@ -24,7 +24,7 @@ typedef struct ray_state {
     size_t count, capacity;
 } ray_state;
 
-static ray_state start_ray(const packet_rays *rays, int lane, const kernel_scratch *scratch)
+static ray_state start_ray(const packet_rays *rays, int lane, const tree_scratch *scratch)
 {
     return (ray_state){.transmittance = 1,
                        .far = rays->far[lane],
@@ -47,7 +47,7 @@ static void finish_ray(const ray_state *r, const packet_rays *rays, int lane, pa
     out->hit_count[lane] = (float)r->blended, out->strongest[lane] = r->top_id;
 }
 
-static bool reserve_hits(ray_state *r, size_t more, kernel_scratch *scratch)
+static bool reserve_hits(ray_state *r, size_t more, tree_scratch *scratch)
 {
     if (r->count + more > r->capacity) {
         const size_t wanted = r->count + more + r->capacity;
@@ -143,7 +143,8 @@ static ray_walk make_walk(const kernel_scene *scene, const float origin[3], cons
     axis_products(u, u, w.square[0]);
     axis_products(v, v, w.square[1]);
     axis_products(u, v, w.square[2]);
-    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2. */
+    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2; s is 16
+       roundings of the largest coordinate. */
     const float slack = 0x1p-20f * scene->coordinate_max;
     w.open = 1001 * slack * slack;
     return w;
@@ -173,6 +174,7 @@ static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(w->origin[axis]));
     for (int k = 0; k < 6; k++)
         s[k] = vfloat16_load(leaf->spread[k]);
+    /* 1.001: see make_walk(); 2^-18: the rounding of spread, as in turn_ellipsoids() */
     const vfloat16 grow = vfloat16_set1(1.001f),
                    slack = vfloat16_fma(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])),
                                         vfloat16_set1(w->open));
@@ -190,7 +192,7 @@ static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
 
 /* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
 static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count,
-                        kernel_scratch *scratch, kernel_counters *counters)
+                        tree_scratch *scratch, kernel_counters *counters)
 {
     vfloat16 color[3];
     uint32_t id[TREE_WIDTH];
@@ -219,7 +221,7 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
 /* Gaussians of a leaf whose ellipsoids the ray meets join those that wait. Few of a leaf do: those of several
    leaves are evaluated together. */
 static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
-                       const tree_leaf *leaf, kernel_scratch *scratch, kernel_counters *counters)
+                       const tree_leaf *leaf, tree_scratch *scratch, kernel_counters *counters)
 {
     counters->nodes++;
     const vmask16 met = vmask16_from_bits(walk_leaf(walk, leaf) & (0xFFFFu >> (TREE_WIDTH - leaf->count)));
@@ -229,7 +231,7 @@ static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *
 
 /* Leaves that the ray enters are visited, nodes wait in the heap. */
 static bool visit_node(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
-                       const tree_node *node, int *heap_count, kernel_scratch *scratch,
+                       const tree_node *node, int *heap_count, tree_scratch *scratch,
                        kernel_counters *counters)
 {
     _Alignas(64) float entry[TREE_WIDTH];
@@ -250,7 +252,7 @@ static bool visit_node(ray_state *r, const kernel_scene *scene, const ray_walk *
 }
 
 static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
-                       unsigned packet, int lane, hit_tape *tape, kernel_scratch *scratch,
+                       unsigned packet, int lane, hit_tape *tape, tree_scratch *scratch,
                        kernel_counters *counters)
 {
     int heap_count = 0;
@@ -273,7 +275,7 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *
 }
 
 static bool trace_ray(const kernel_scene *scene, const packet_rays *rays, unsigned packet, int lane,
-                      packet_output *out, hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+                      packet_output *out, hit_tape *tape, tree_scratch *scratch, kernel_counters *counters)
 {
     packet_rays alone;
     ray_state r = start_ray(rays, lane, scratch);

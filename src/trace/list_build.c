@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_lists.c -- lists of the parts of tiles, from the records of a view.
+/* trace/list_build.c -- lists of the parts of tiles, from the records of a view.
 
-   rays --> faces, parts and their slopes (view_faces.c)
-   Gaussians --> records of each face (list_kernel.make_records) --> groups of blocks: parts reached, a
-        histogram per group --> place of each group in each part --> lists, by index of the Gaussian */
-#include "trace/view_lists.h"
+   rays --> faces, parts and their slopes (list_faces.c)
+   Gaussians --> records of each face (list_kernel.make_records) --> batches of blocks: parts reached, a
+        histogram per batch --> place of each batch in each part --> lists, by index of the Gaussian */
+#include "trace/list_build.h"
 
 #include <stdatomic.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/parallel.h"
-#include "trace/view_faces.h"
+#include "trace/list_faces.h"
 
-enum { GROUPS = 64 };
+enum { BATCHES = 64 };
 
 /* Pairs of Gaussians that need their ellipsoids tested and parts: beyond this the tree is cheaper. Parts of
    rays are never traced by the tree, whose depths differ in rounding: a hit could be counted twice, or not at
@@ -21,24 +21,24 @@ enum { GROUPS = 64 };
 static const size_t general_pairs_most = (size_t)1 << 24;
 
 /* Blocks of records that are put into lists together. */
-typedef struct list_group {
+typedef struct record_batch {
     uint32_t *parts; /* of the pairs, record by record */
     size_t count, capacity;
-} list_group;
+} record_batch;
 
 /* ---- records ---- */
 
 typedef struct list_job {
-    view_lists *lists;
+    list_builder *lists;
     const list_kernel *kernel;
     const kernel_scene *scene;
     const gaussians *g;
     size_t entries; /* faces times blocks of Gaussians */
-    size_t entries_per_group;
+    size_t entries_per_batch;
     atomic_bool failed;
 } list_job;
 
-static const view_face *face_of_entry(const list_view *view, size_t entry)
+static const list_face *face_of_entry(const list_view *view, size_t entry)
 {
     return &view->face[entry / view->block_count];
 }
@@ -56,17 +56,17 @@ static void record_entry(size_t entry, size_t begin, size_t end, void *context)
     const list_job *job = context;
     list_view *view = &job->lists->view;
     const bool one = view->face_count == 1;
-    view_kept *kept = &view->kept[entry];
+    list_kept *kept = &view->kept[entry];
     const size_t first = kept->first;
     (void)begin;
     (void)end;
     *kept = job->kernel->make_records(
         job->scene, job->g, face_of_entry(view, entry), entry % view->block_count,
-        one ? NULL : view->reached + entry * (VIEW_GRAIN / 16), view->records + first, view->shapes + first);
+        one ? NULL : view->reached + entry * (LIST_GRAIN / 16), view->records + first, view->shapes + first);
     kept->first = first;
 }
 
-static gbt_status reserve_records(view_lists *lists, size_t count, gbt_error *err)
+static gbt_status reserve_records(list_builder *lists, size_t count, gbt_error *err)
 {
     list_view *view = &lists->view;
     if (view->records != NULL && count <= lists->record_capacity)
@@ -91,26 +91,26 @@ static gbt_status reserve_records(view_lists *lists, size_t count, gbt_error *er
    into them. */
 static gbt_status place_records(const list_job *job, size_t *total, gbt_error *err)
 {
-    view_lists *lists = job->lists;
+    list_builder *lists = job->lists;
     list_view *view = &lists->view;
     memset(view->kept, 0, job->entries * sizeof *view->kept);
     *total = 0;
     if (view->face_count > 1) {
         GBT_TRY(mem_reserve((void **)&view->reached, &lists->reached_capacity, 0,
-                            job->entries * (VIEW_GRAIN / 16) + 1, sizeof *view->reached, "records of a view",
+                            job->entries * (LIST_GRAIN / 16) + 1, sizeof *view->reached, "records of a view",
                             err));
         parallel_blocks(view->block_count, 1, reach_block, (void *)job);
     }
     for (size_t i = 0; i < job->entries; i++) {
         view->kept[i].first = *total;
-        *total += view->face_count > 1 ? view->kept[i].records : VIEW_GRAIN;
+        *total += view->face_count > 1 ? view->kept[i].records : LIST_GRAIN;
     }
     return GBT_OK;
 }
 
 static gbt_status make_records_of(list_job *job, gbt_error *err)
 {
-    view_lists *lists = job->lists;
+    list_builder *lists = job->lists;
     list_view *view = &lists->view;
     size_t total;
     GBT_TRY(mem_reserve((void **)&view->kept, &lists->kept_capacity, 0, job->entries + 1, sizeof *view->kept,
@@ -123,14 +123,14 @@ static gbt_status make_records_of(list_job *job, gbt_error *err)
 
 /* ---- pairs ---- */
 
-/* The parts of record `at` to the end of the group's. False when memory ran out. */
-static bool add_parts(const list_job *job, list_group *group, const view_face *face, size_t at)
+/* The parts of record `at` to the end of the batch's. False when memory ran out. */
+static bool add_parts(const list_job *job, record_batch *batch, const list_face *face, size_t at)
 {
-    const size_t most = group->count + face->part_count + 16;
-    if (mem_reserve((void **)&group->parts, &group->capacity, group->count, most, sizeof *group->parts,
+    const size_t most = batch->count + face->part_count + 16;
+    if (mem_reserve((void **)&batch->parts, &batch->capacity, batch->count, most, sizeof *batch->parts,
                     "pairs of Gaussian and tile", NULL) != GBT_OK)
         return false;
-    group->count += job->kernel->find_parts(&job->lists->view, face, at, group->parts + group->count);
+    batch->count += job->kernel->find_parts(&job->lists->view, face, at, batch->parts + batch->count);
     return true;
 }
 
@@ -138,21 +138,21 @@ static void find_pairs(size_t index, size_t begin, size_t end, void *context)
 {
     list_job *job = context;
     list_view *view = &job->lists->view;
-    list_group *group = &job->lists->groups[index];
+    record_batch *batch = &job->lists->batches[index];
     uint32_t *histogram = job->lists->histogram + index * view->part_count;
     memset(histogram, 0, view->part_count * sizeof *histogram);
-    group->count = 0;
+    batch->count = 0;
     for (size_t entry = begin; entry < end; entry++) {
-        const view_kept *kept = &view->kept[entry];
+        const list_kept *kept = &view->kept[entry];
         for (size_t at = kept->first; at < kept->first + kept->records; at++) {
-            const size_t before = group->count;
-            if (!add_parts(job, group, face_of_entry(view, entry), at)) {
+            const size_t before = batch->count;
+            if (!add_parts(job, batch, face_of_entry(view, entry), at)) {
                 atomic_store(&job->failed, true);
                 return;
             }
-            view->slot_count[at] = (uint32_t)(group->count - before);
-            for (size_t k = before; k < group->count; k++)
-                histogram[group->parts[k]]++;
+            view->slot_count[at] = (uint32_t)(batch->count - before);
+            for (size_t k = before; k < batch->count; k++)
+                histogram[batch->parts[k]]++;
         }
     }
 }
@@ -161,30 +161,30 @@ static void place_pairs(size_t index, size_t begin, size_t end, void *context)
 {
     const list_job *job = context;
     list_view *view = &job->lists->view;
-    const uint32_t *part = job->lists->groups[index].parts;
+    const uint32_t *part = job->lists->batches[index].parts;
     uint32_t *place = job->lists->histogram + index * view->part_count;
     for (size_t entry = begin; entry < end; entry++) {
-        const view_kept *kept = &view->kept[entry];
+        const list_kept *kept = &view->kept[entry];
         for (size_t at = kept->first; at < kept->first + kept->records; at++)
             for (uint32_t k = 0; k < view->slot_count[at]; k++)
                 view->pairs[place[*part++]++] = (list_pair){(uint32_t)at, view->slot_first[at] + k};
     }
 }
 
-/* Counts per group and part become places in the list of all parts. */
-static gbt_status place_groups(const list_job *job, size_t groups, gbt_error *err)
+/* Counts per batch and part become places in the list of all parts. */
+static gbt_status place_batches(const list_job *job, size_t batches, gbt_error *err)
 {
     list_view *view = &job->lists->view;
     size_t total = 0;
-    for (size_t i = 0; i < groups; i++)
-        total += job->lists->groups[i].count;
+    for (size_t i = 0; i < batches; i++)
+        total += job->lists->batches[i].count;
     if (total >= UINT32_MAX)
         return base_fail(err, GBT_ERR_NO_MEMORY, "trace: %zu pairs of Gaussian and tile (limit 2^32)", total);
     view->pair_count = total;
     size_t next = 0;
     for (size_t part = 0; part < view->part_count; part++) {
         view->first[part] = next;
-        for (size_t i = 0; i < groups; i++) {
+        for (size_t i = 0; i < batches; i++) {
             uint32_t *place = &job->lists->histogram[i * view->part_count + part];
             const uint32_t count = *place;
             *place = (uint32_t)next;
@@ -199,7 +199,7 @@ static void number_slots(list_view *view, size_t entries)
 {
     uint32_t next = 0;
     for (size_t entry = 0; entry < entries; entry++) {
-        const view_kept *kept = &view->kept[entry];
+        const list_kept *kept = &view->kept[entry];
         for (size_t at = kept->first; at < kept->first + kept->records; at++) {
             view->slot_first[at] = next;
             next += view->slot_count[at];
@@ -207,36 +207,36 @@ static void number_slots(list_view *view, size_t entries)
     }
 }
 
-static gbt_status reserve_groups(view_lists *lists, size_t count, gbt_error *err)
+static gbt_status reserve_batches(list_builder *lists, size_t count, gbt_error *err)
 {
-    const size_t old = lists->group_capacity;
-    GBT_TRY(mem_reserve((void **)&lists->groups, &lists->group_capacity, old, count, sizeof *lists->groups,
+    const size_t old = lists->batch_capacity;
+    GBT_TRY(mem_reserve((void **)&lists->batches, &lists->batch_capacity, old, count, sizeof *lists->batches,
                         "tile lists", err));
-    memset(lists->groups + old, 0, (lists->group_capacity - old) * sizeof *lists->groups);
+    memset(lists->batches + old, 0, (lists->batch_capacity - old) * sizeof *lists->batches);
     return GBT_OK;
 }
 
 static gbt_status make_pairs(list_job *job, gbt_error *err)
 {
-    view_lists *lists = job->lists;
+    list_builder *lists = job->lists;
     list_view *view = &lists->view;
-    job->entries_per_group = (job->entries + GROUPS - 1) / GROUPS;
-    if (job->entries_per_group == 0)
-        job->entries_per_group = 1;
-    const size_t groups = parallel_block_count(job->entries, job->entries_per_group);
-    GBT_TRY(reserve_groups(lists, groups + 1, err));
+    job->entries_per_batch = (job->entries + BATCHES - 1) / BATCHES;
+    if (job->entries_per_batch == 0)
+        job->entries_per_batch = 1;
+    const size_t batches = parallel_block_count(job->entries, job->entries_per_batch);
+    GBT_TRY(reserve_batches(lists, batches + 1, err));
     GBT_TRY(mem_reserve((void **)&lists->histogram, &lists->histogram_capacity, 0,
-                        groups * view->part_count + 1, sizeof *lists->histogram, "tile lists", err));
+                        batches * view->part_count + 1, sizeof *lists->histogram, "tile lists", err));
     GBT_TRY(mem_reserve((void **)&view->first, &lists->first_capacity, 0, view->part_count + 1,
                         sizeof *view->first, "tile lists", err));
-    parallel_blocks(job->entries, job->entries_per_group, find_pairs, job);
+    parallel_blocks(job->entries, job->entries_per_batch, find_pairs, job);
     if (atomic_load(&job->failed))
         return base_fail(err, GBT_ERR_NO_MEMORY, "trace: no memory for pairs of Gaussian and tile");
-    GBT_TRY(place_groups(job, groups, err));
+    GBT_TRY(place_batches(job, batches, err));
     number_slots(view, job->entries);
     GBT_TRY(mem_reserve((void **)&view->pairs, &lists->pair_capacity, 0, view->pair_count + 1,
                         sizeof *view->pairs, "tile lists", err));
-    parallel_blocks(job->entries, job->entries_per_group, place_pairs, job);
+    parallel_blocks(job->entries, job->entries_per_batch, place_pairs, job);
     return GBT_OK;
 }
 
@@ -249,16 +249,16 @@ static bool few_general(const list_job *job)
     return pairs <= general_pairs_most;
 }
 
-gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const kernel_scene *scene,
-                           const gaussians *g, const ray_image *rays, bool *usable, gbt_error *err)
+gbt_status list_builder_make(list_builder *lists, const list_kernel *kernel, const kernel_scene *scene,
+                             const gaussians *g, const ray_image *rays, bool *usable, gbt_error *err)
 {
     list_view *view = &lists->view;
-    *usable = g->count < UINT32_MAX / 2 / VIEW_FACES;
+    *usable = g->count < UINT32_MAX / 2 / LIST_FACES;
     if (*usable)
-        GBT_TRY(view_faces_make(lists, rays, usable, err));
+        GBT_TRY(list_faces_make(lists, rays, usable, err));
     if (!*usable)
         return GBT_OK;
-    view->block_count = parallel_block_count(g->count, VIEW_GRAIN);
+    view->block_count = parallel_block_count(g->count, LIST_GRAIN);
     list_job job = {.lists = lists,
                     .kernel = kernel,
                     .scene = scene,
@@ -270,16 +270,16 @@ gbt_status view_lists_make(view_lists *lists, const list_kernel *kernel, const k
     return *usable ? make_pairs(&job, err) : GBT_OK;
 }
 
-gbt_status view_lists_reserve_slots(view_lists *lists, gbt_error *err)
+gbt_status list_builder_reserve_slots(list_builder *lists, gbt_error *err)
 {
     list_view *view = &lists->view;
     GBT_TRY(mem_reserve((void **)&view->slots, &lists->slot_capacity, 0, view->pair_count + 1,
                         sizeof *view->slots, "gradient records", err));
-    return mem_reserve((void **)&view->slot_used, &lists->used_capacity, 0, view->pair_count + 1,
+    return mem_reserve((void **)&view->slot_used, &lists->slot_used_capacity, 0, view->pair_count + 1,
                        sizeof *view->slot_used, "gradient records", err);
 }
 
-size_t view_lists_bytes(const view_lists *lists)
+size_t list_builder_bytes(const list_builder *lists)
 {
     const list_view *v = &lists->view;
     return lists->record_capacity *
@@ -287,14 +287,15 @@ size_t view_lists_bytes(const view_lists *lists)
            lists->pair_capacity * sizeof *v->pairs;
 }
 
-void view_lists_free(view_lists *lists)
+void list_builder_free(list_builder *lists)
 {
     list_view *v = &lists->view;
-    for (size_t i = 0; i < lists->group_capacity; i++)
-        mem_free(lists->groups[i].parts);
-    void *const owned[] = {v->parts,   v->boxes,     v->fine,       v->group,         v->reached,  v->kept,
-                           v->records, v->shapes,    v->slot_first, v->slot_count,    v->pairs,    v->first,
-                           v->slots,   v->slot_used, lists->groups, lists->histogram, lists->faces};
+    for (size_t i = 0; i < lists->batch_capacity; i++)
+        mem_free(lists->batches[i].parts);
+    void *const owned[] = {v->parts,         v->part_boxes,    v->boxes16, v->boxes256,   v->reached,
+                           v->kept,          v->records,       v->shapes,  v->slot_first, v->slot_count,
+                           v->pairs,         v->first,         v->slots,   v->slot_used,  lists->batches,
+                           lists->histogram, lists->tile_faces};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         mem_free(owned[i]);
     memset(lists, 0, sizeof *lists);

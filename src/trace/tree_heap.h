@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/heap.h -- nodes and leaves of a tree waiting for their turn, nearest first. */
-#ifndef GBT_TRACE_HEAP_H
-#define GBT_TRACE_HEAP_H
+/* trace/tree_heap.h -- nodes and leaves of a tree waiting for their turn, nearest first. */
+#ifndef GBT_TRACE_TREE_HEAP_H
+#define GBT_TRACE_TREE_HEAP_H
 
 #include <stdint.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/tile_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend.
+/* trace/tree_kernel.inc.h -- a tile of neighbouring packets through the tree: gather, cull, evaluate, blend.
    Compiled once per instruction set.
 
      heap of nodes by a lower bound of t --> nearest
@@ -7,23 +7,23 @@
          --> leaf: its ellipsoids that reach into the tile become candidates, which wait until nothing
                    nearer can still come
      candidates --> every packet evaluates those that reach into its beam, one row each
-                --> blends the rows before the horizon (rows16.h)
+                --> blends the rows before the horizon (tree_rows16.h)
 
    The horizon is the nearest bound of what is left in the heap or waiting: nothing can still come before it.
    A packet stops when all of its rays are opaque; one that needs more rows than there are goes ray by ray
-   (ray16.h).
+   (tree_ray16.h).
 
-   Wanted before inclusion: KERNEL_NAME, the name of the exported tile_kernel. */
+   Wanted before inclusion: KERNEL_NAME, the name of the exported tree_kernel. */
 
-#include "trace/adjoint16.h"
-#include "trace/beam16.h"
 #include "trace/embree16.h"
 #include "trace/gaussian16.h"
-#include "trace/heap.h"
-#include "trace/kernel.h"
-#include "trace/ray16.h"
-#include "trace/rows16.h"
-#include "trace/view16.h"
+#include "trace/tree_adjoint16.h"
+#include "trace/tree_beam16.h"
+#include "trace/tree_heap.h"
+#include "trace/tree_kernel.h"
+#include "trace/tree_ray16.h"
+#include "trace/tree_rows16.h"
+#include "trace/tree_view16.h"
 
 enum {
     CHUNK_TARGET = 64, /* new candidates before the packets take their part */
@@ -203,6 +203,7 @@ static inline void take_leaf(tile_state *s, const kernel_scene *scene, const tre
     unsigned inside, front = 0;
     if (s->common_origin) {
         vfloat16 slope[4];
+        /* 1.001: no hit is so near that rounding could cut it at t_near; 2^-20: as in make_beam() */
         front = vmask16_bits(ellipsoid_slopes(&e, 1.001f * scene->settings.t_near,
                                               0x1p-20f * scene->coordinate_max, slope)) &
                 filled;
@@ -390,7 +391,7 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
 
 /* The packets that are done in `done`; the others are traced ray by ray. */
 static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done,
-                        packet_output out[TILE_PACKETS], hit_tape *tape, kernel_scratch *scratch,
+                        packet_output out[TILE_PACKETS], hit_tape *tape, tree_scratch *scratch,
                         kernel_counters *counters)
 {
     for (int p = 0; p < TILE_PACKETS; p++) {
@@ -413,7 +414,7 @@ static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const 
 }
 
 static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
-                    hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+                    hit_tape *tape, tree_scratch *scratch, kernel_counters *counters)
 {
     tile_state s;
     unsigned packets = 0;
@@ -441,7 +442,7 @@ static bool forward(const kernel_scene *scene, const tile_rays *rays, packet_out
 }
 
 static bool forward_single(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
-                           hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+                           hit_tape *tape, tree_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++)
         for (unsigned bits = rays->packet[p].active; bits != 0; bits &= bits - 1, counters->rays++)
@@ -451,7 +452,7 @@ static bool forward_single(const kernel_scene *scene, const tile_rays *rays, pac
 }
 
 static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, packet_output out[TILE_PACKETS],
-                           hit_tape *tape, kernel_scratch *scratch, kernel_counters *counters)
+                           hit_tape *tape, tree_scratch *scratch, kernel_counters *counters)
 {
     for (unsigned p = 0; p < TILE_PACKETS; p++) {
         counters->rays += (uint64_t)__builtin_popcount(rays->packet[p].active);
@@ -462,4 +463,4 @@ static bool forward_embree(const kernel_scene *scene, const tile_rays *rays, pac
     return tape == NULL || tape_add(tape, (tape_entry){0, 0, TAPE_END});
 }
 
-const tile_kernel KERNEL_NAME = {forward, forward_single, forward_embree, backward};
+const tree_kernel KERNEL_NAME = {forward, forward_single, forward_embree, backward};

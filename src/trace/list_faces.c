@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/view_faces.c -- the faces of a view, the parts of tiles that each of them sees, and their slopes.
+/* trace/list_faces.c -- the faces of a view, the parts of tiles that each of them sees, and their slopes.
 
    One face, if all rays look into the half space about their middle; else the six of a cube about it. A tile
    all of whose rays lie well inside one face is that face's; the rays of others each go to the face of their
    largest component. */
-#include "trace/view_faces.h"
+#include "trace/list_faces.h"
 
 #include <float.h>
 #include <math.h>
@@ -19,12 +19,6 @@
 /* A face sees rays up to 72 degrees from its axis. */
 static const float component_least = 0.3f;
 
-static bool ray_is_sound(const float d[3])
-{
-    const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    return square > 0.99f && square < 1.01f;
-}
-
 /* ---- axes ---- */
 
 /* Sum of the sound directions among a few all over the picture, and along its rows. */
@@ -38,19 +32,19 @@ static void find_directions(const ray_image *rays, double middle[3], double alon
             const size_t x = (size_t)((rays->width - 1) * (int64_t)k / STEPS),
                          y = (size_t)((rays->height - 1) * (int64_t)i / STEPS);
             const float *d = rays->dir + 3 * (y * (size_t)rays->width + x);
-            for (int c = 0; c < 3 && ray_is_sound(d); c++) {
+            for (int c = 0; c < 3 && ray_direction_is_sound(d); c++) {
                 middle[c] += (double)d[c];
                 along[c] += (k - STEPS / 2) * (double)d[c];
             }
         }
 }
 
-static bool make_frame(const ray_image *rays, view_frame *out)
+static bool make_frame(const ray_image *rays, list_frame *out)
 {
     double u[3], v[3], w[3];
     const float *o = rays->origin;
     find_directions(rays, w, u);
-    if (!(fabsf(o[0]) + fabsf(o[1]) + fabsf(o[2]) < 1e17f))
+    if (!ray_origin_is_sound(o))
         return false;
     if (!(dvec_length(w) > 1e-3)) { /* they look everywhere */
         w[0] = w[1] = 0;
@@ -85,11 +79,11 @@ static bool make_frame(const ray_image *rays, view_frame *out)
 }
 
 /* Face `f` of a cube whose first face is `first`: it looks along w, -w, u, -u, v, -v for 0 to 5. */
-static view_frame turn_frame(const view_frame *first, int f)
+static list_frame turn_frame(const list_frame *first, int f)
 {
     const int look = (f / 2 + 2) % 3, a = (look + 1) % 3, b = (look + 2) % 3;
     const int from[3] = {f % 2 == 0 ? a : b, f % 2 == 0 ? b : a, look}; /* right-handed either way */
-    view_frame out = *first;
+    list_frame out = *first;
     for (int k = 0; k < 3; k++)
         for (int c = 0; c < 3; c++) {
             const bool back = k == 2 && f % 2 != 0;
@@ -140,18 +134,18 @@ static bool tile_sees(const ray_image *rays, size_t tile)
 }
 
 typedef struct face_job {
-    view_lists *lists;
+    list_builder *lists;
     const ray_image *rays;
-    uint8_t *faces; /* of each tile, a bit per face */
+    uint8_t *tile_faces; /* list_builder.tile_faces */
     atomic_bool apart;
 } face_job;
 
 /* Slopes of the part's rays; false when some are too far from the axis. */
-static bool slopes_of_part(const list_view *view, const ray_image *rays, const view_part *part,
+static bool slopes_of_part(const list_view *view, const ray_image *rays, const list_part *part,
                            slope_box *out)
 {
     float dual[3][3];
-    const view_frame *frame = &view->face[part->face].frame;
+    const list_frame *frame = &view->face[part->face].frame;
     for (int k = 0; k < 9; k++)
         dual[k / 3][k % 3] = (float)frame->dual[k / 3][k % 3];
     const pixel_range at = tile_pixels(rays, part->tile);
@@ -160,7 +154,7 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const v
     for (int y = at.y0; y < at.y1; y++) {
         const float *d = ray_at(rays, at.x0, y);
         for (int x = at.x0; x < at.x1; x++, d += 3) {
-            if (!ray_is_sound(d) || !part_has_ray(view, part, d))
+            if (!ray_direction_is_sound(d) || !part_has_ray(view, part, d))
                 continue;
             const float w = dual[2][0] * d[0] + dual[2][1] * d[1] + dual[2][2] * d[2], inverse = 1 / w;
             near = near && w > component_least;
@@ -172,6 +166,8 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const v
         }
     }
     for (int k = 0; k < 2 && box.low[0] <= box.high[0]; k++) {
+        /* 16 ulps of the largest slopes, tan 72 degrees; and more than the packets' boxes are opened by
+           (slope_rays). */
         const float open = 4e-6f + 2e-3f * (box.high[k] - box.low[k]);
         box.low[k] -= open;
         box.high[k] += open;
@@ -187,9 +183,9 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
     bool near = true;
     (void)block;
     for (size_t i = begin; i < end; i++) {
-        view_part *part = &view->parts[i];
+        list_part *part = &view->parts[i];
         part->sees = tile_sees(job->rays, part->tile);
-        near = slopes_of_part(view, job->rays, part, &view->boxes[i]) && near;
+        near = slopes_of_part(view, job->rays, part, &view->part_boxes[i]) && near;
     }
     if (!near)
         atomic_store(&job->apart, true);
@@ -198,7 +194,7 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
 /* ---- six faces ---- */
 
 /* Faces of the rays of a tile. */
-static unsigned faces_of_rays(const view_frame *frame, const ray_image *rays, const pixel_range *at)
+static unsigned faces_of_rays(const list_frame *frame, const ray_image *rays, const pixel_range *at)
 {
     unsigned faces = 0;
     for (int y = at->y0; y < at->y1; y++)
@@ -206,13 +202,13 @@ static unsigned faces_of_rays(const view_frame *frame, const ray_image *rays, co
             const float *d = ray_at(rays, x, y);
             float component[3];
             face_components(frame, d, component);
-            faces |= ray_is_sound(d) ? 1u << face_of(component) : 0;
+            faces |= ray_direction_is_sound(d) ? 1u << face_of(component) : 0;
         }
     return faces;
 }
 
 /* Which faces see a tile: one, if it sees all rays well, best the first; else those of its rays. */
-static unsigned faces_of_tile(const view_frame *frame, const ray_image *rays, size_t tile)
+static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, size_t tile)
 {
     const pixel_range at = tile_pixels(rays, tile);
     float low[3] = {FLT_MAX, FLT_MAX, FLT_MAX}, high[3] = {-FLT_MAX, -FLT_MAX, -FLT_MAX};
@@ -220,7 +216,7 @@ static unsigned faces_of_tile(const view_frame *frame, const ray_image *rays, si
         for (int x = at.x0; x < at.x1; x++) {
             const float *d = ray_at(rays, x, y);
             float component[3];
-            if (!ray_is_sound(d))
+            if (!ray_direction_is_sound(d))
                 continue;
             face_components(frame, d, component);
             for (int k = 0; k < 3; k++) {
@@ -232,7 +228,7 @@ static unsigned faces_of_tile(const view_frame *frame, const ray_image *rays, si
         return 1;
     float most = component_least;
     unsigned best = 0;
-    for (int f = 0; f < VIEW_FACES; f++) {
+    for (int f = 0; f < LIST_FACES; f++) {
         const int axis = (f / 2 + 2) % 3;
         const float least = f % 2 == 0 ? low[axis] : -high[axis];
         best = least > most ? 1u << f : best;
@@ -246,21 +242,21 @@ static void find_faces(size_t block, size_t begin, size_t end, void *context)
     const face_job *job = context;
     (void)block;
     for (size_t i = begin; i < end; i++)
-        job->faces[i] = (uint8_t)faces_of_tile(&job->lists->view.face[0].frame, job->rays, i);
+        job->tile_faces[i] = (uint8_t)faces_of_tile(&job->lists->view.face[0].frame, job->rays, i);
 }
 
-static gbt_status reserve_parts(view_lists *lists, size_t count, gbt_error *err)
+static gbt_status reserve_parts(list_builder *lists, size_t count, gbt_error *err)
 {
     list_view *view = &lists->view;
     view->part_count = count;
     GBT_TRY(mem_reserve((void **)&view->parts, &lists->part_capacity, 0, count, sizeof *view->parts,
                         "tile lists", err));
-    return mem_reserve((void **)&view->boxes, &lists->tile_capacity, 0, count, sizeof *view->boxes,
-                       "tile lists", err);
+    return mem_reserve((void **)&view->part_boxes, &lists->part_box_capacity, 0, count,
+                       sizeof *view->part_boxes, "tile lists", err);
 }
 
 /* With one face, parts are tiles. */
-static gbt_status parts_of_one(view_lists *lists, size_t tiles, gbt_error *err)
+static gbt_status parts_of_one(list_builder *lists, size_t tiles, gbt_error *err)
 {
     list_view *view = &lists->view;
     GBT_TRY(reserve_parts(lists, tiles, err));
@@ -268,32 +264,33 @@ static gbt_status parts_of_one(view_lists *lists, size_t tiles, gbt_error *err)
     view->face[0].first_part = 0;
     view->face[0].part_count = tiles;
     for (size_t i = 0; i < tiles; i++)
-        view->parts[i] = (view_part){.tile = (uint32_t)i, .whole = true, .first = true};
+        view->parts[i] = (list_part){.tile = (uint32_t)i, .whole = true, .first = true};
     return GBT_OK;
 }
 
 static gbt_status parts_of_six(face_job *job, size_t tiles, gbt_error *err)
 {
-    view_lists *lists = job->lists;
+    list_builder *lists = job->lists;
     list_view *view = &lists->view;
     size_t count = 0;
-    GBT_TRY(mem_reserve((void **)&lists->faces, &lists->face_capacity, 0, tiles, 1, "tile lists", err));
-    job->faces = lists->faces;
+    GBT_TRY(
+        mem_reserve((void **)&lists->tile_faces, &lists->tile_face_capacity, 0, tiles, 1, "tile lists", err));
+    job->tile_faces = lists->tile_faces;
     parallel_blocks(tiles, 16, find_faces, job);
     for (size_t i = 0; i < tiles; i++)
-        count += (size_t)__builtin_popcount(job->faces[i]);
+        count += (size_t)__builtin_popcount(job->tile_faces[i]);
     GBT_TRY(reserve_parts(lists, count, err));
-    view->face_count = VIEW_FACES;
+    view->face_count = LIST_FACES;
     count = 0;
-    for (int f = 0; f < VIEW_FACES; f++) {
-        view_face *face = &view->face[f];
+    for (int f = 0; f < LIST_FACES; f++) {
+        list_face *face = &view->face[f];
         if (f > 0)
             face->frame = turn_frame(&view->face[0].frame, f);
         face->first_part = count;
         for (size_t i = 0; i < tiles; i++) {
-            const unsigned faces = job->faces[i], below = faces & ((1u << f) - 1);
+            const unsigned faces = job->tile_faces[i], below = faces & ((1u << f) - 1);
             if (faces >> f & 1)
-                view->parts[count++] = (view_part){.tile = (uint32_t)i,
+                view->parts[count++] = (list_part){.tile = (uint32_t)i,
                                                    .face = (uint8_t)f,
                                                    .whole = __builtin_popcount(faces) == 1,
                                                    .first = below == 0};
@@ -313,7 +310,7 @@ static void widen(slope_box *box, const slope_box *other)
     }
 }
 
-static void set_lane(part_boxes *boxes, size_t lane, const slope_box *box)
+static void set_lane(box_lanes *boxes, size_t lane, const slope_box *box)
 {
     for (int k = 0; k < 2; k++) {
         boxes->edge[2 * k][lane] = box->low[k];
@@ -321,49 +318,49 @@ static void set_lane(part_boxes *boxes, size_t lane, const slope_box *box)
     }
 }
 
-static void set_boxes(list_view *view, view_face *face)
+static void set_boxes(list_view *view, list_face *face)
 {
     face->bounds = nothing;
     for (size_t i = 0; i < face->part_count; i++)
-        widen(&face->bounds, &view->boxes[face->first_part + i]);
-    for (size_t group = 0; group < face->groups; group++)
+        widen(&face->bounds, &view->part_boxes[face->first_part + i]);
+    for (size_t outer = 0; outer < face->box256_count; outer++)
         for (size_t i = 0; i < 16; i++) {
-            const size_t at = 16 * group + i;
+            const size_t at = 16 * outer + i;
             slope_box around = nothing;
-            for (size_t lane = 0; lane < 16 && at < face->boxes; lane++) {
+            for (size_t lane = 0; lane < 16 && at < face->box16_count; lane++) {
                 const size_t part = 16 * at + lane;
                 const bool listed = part < face->part_count && view->parts[face->first_part + part].sees;
-                const slope_box *box = listed ? &view->boxes[face->first_part + part] : &nothing;
-                set_lane(&view->fine[face->first_boxes + at], lane, box);
+                const slope_box *box = listed ? &view->part_boxes[face->first_part + part] : &nothing;
+                set_lane(&view->boxes16[face->first_box16 + at], lane, box);
                 widen(&around, box);
             }
-            set_lane(&view->group[face->first_group + group], i, &around);
+            set_lane(&view->boxes256[face->first_box256 + outer], i, &around);
         }
 }
 
-static gbt_status make_boxes(view_lists *lists, gbt_error *err)
+static gbt_status make_boxes(list_builder *lists, gbt_error *err)
 {
     list_view *view = &lists->view;
-    size_t boxes = 0, groups = 0;
+    size_t count16 = 0, count256 = 0;
     for (int f = 0; f < view->face_count; f++) {
-        view_face *face = &view->face[f];
-        face->first_boxes = boxes;
-        face->first_group = groups;
-        face->boxes = (face->part_count + 15) / 16;
-        face->groups = (face->boxes + 15) / 16;
-        boxes += face->boxes;
-        groups += face->groups;
+        list_face *face = &view->face[f];
+        face->first_box16 = count16;
+        face->first_box256 = count256;
+        face->box16_count = (face->part_count + 15) / 16;
+        face->box256_count = (face->box16_count + 15) / 16;
+        count16 += face->box16_count;
+        count256 += face->box256_count;
     }
-    GBT_TRY(mem_reserve((void **)&view->fine, &lists->fine_capacity, 0, boxes, sizeof *view->fine,
+    GBT_TRY(mem_reserve((void **)&view->boxes16, &lists->box16_capacity, 0, count16, sizeof *view->boxes16,
                         "tile lists", err));
-    GBT_TRY(mem_reserve((void **)&view->group, &lists->boxes_capacity, 0, groups, sizeof *view->group,
-                        "tile lists", err));
+    GBT_TRY(mem_reserve((void **)&view->boxes256, &lists->box256_capacity, 0, count256,
+                        sizeof *view->boxes256, "tile lists", err));
     for (int f = 0; f < view->face_count; f++)
         set_boxes(view, &view->face[f]);
     return GBT_OK;
 }
 
-gbt_status view_faces_make(view_lists *lists, const ray_image *rays, bool *usable, gbt_error *err)
+gbt_status list_faces_make(list_builder *lists, const ray_image *rays, bool *usable, gbt_error *err)
 {
     const size_t tiles = (size_t)((rays->width + TILE_PIXELS - 1) / TILE_PIXELS) *
                          (size_t)((rays->height + TILE_PIXELS - 1) / TILE_PIXELS);

@@ -491,7 +491,7 @@ static void a_sky_that_is_not_learned_is_told(void **state)
         open_ok(&t, folder, &def);
         be_quiet();
         assert_int_equal(t.settings.sky.varies, cases[i].says == NULL);
-        assert_int_equal(t.photos.through[t.train_views[0]] != NULL, cases[i].change == cut_out);
+        assert_int_equal(t.photos.transparency[t.train_views[0]] != NULL, cases[i].change == cut_out);
         if (cases[i].says == NULL)
             assert_string_equal(warning, "");
         else

@@ -178,9 +178,8 @@ static void gather_gradients(const gather_job *job, const gradient_view *view, s
         to_camera(view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
-        /* Of one of n x n parts the loss, a mean, has n^2 times the photo's gradient; the half width is 1/n
-           of the photo's. */
-        s->grad_accum[at] += smaller(screen_gradient(view, p, d) / job->parts, gradient_max);
+        /* The half width of one of n x n parts is 1/n of the photo's. */
+        s->grad_accum[at] += smaller(screen_gradient(view, p, d) * (float)job->parts, gradient_max);
         s->grad_count[at] += 1;
     }
 }

@@ -56,7 +56,7 @@ typedef struct gathered {
     growth_stats s;
 } gathered;
 
-/* Of a photo whose loss is a mean, or of one of its parts x parts parts. */
+/* Of a photo, or of one of its parts x parts parts, whose loss is its share of the photo's. */
 static void gather(const lens_case *c, int parts, const anchors *a, const decoder *d,
                    growth_counting counting, gathered *g)
 {
@@ -70,7 +70,7 @@ static void gather(const lens_case *c, int parts, const anchors *a, const decode
     assert_ok(frame_render(&g->f, frame_neural(a, d), &camera, &settings, true, NULL));
     assert_ok(image_alloc(&d_image, camera.width, camera.height, 3, NULL));
     for (size_t i = 0; i < 3 * (size_t)camera.width * (size_t)camera.height; i++)
-        d_image.pixels[i] = 1e-3f * (float)(parts * parts);
+        d_image.pixels[i] = 1e-3f;
     assert_ok(frame_backward_gaussians(&g->f, &d_image, NULL));
     assert_ok(growth_stats_resize(&g->s, ANCHORS, OFFSETS, NULL));
     growth_stats_gather(&g->s, &g->f, GROWTH_BY_SHARE, counting, 0.01f, parts);

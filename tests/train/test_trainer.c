@@ -1786,6 +1786,67 @@ static void every_part_has_its_turn(void **state)
     trainer_free(&t);
 }
 
+/* What the gradients of one photo's parts come to. */
+static void add_up_parts(int parts, float *feature, float *networks)
+{
+    trainer t;
+    gbt_train_def def = run_def();
+    def.iterations = 1000;
+    def.start_level = 0;
+    open_ok(&t, tiny, &def);
+    t.rules.step_pixels = 48 * 36 / (float)(parts * parts);
+    for (; t.step < (uint64_t)(parts * parts) * t.train_count; t.step++) {
+        step_view *v = pick_ok(&t);
+        if (v->slot != 0)
+            continue;
+        step_view_run(&t, v);
+        assert_ok(v->outcome.status);
+        assert_int_equal(v->outcome.parts, parts);
+        for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
+            feature[i] += t.gradient.anchors.feature[i];
+        for (size_t i = 0; i < t.decoder.param_count; i++)
+            networks[i] += t.gradient.networks[i];
+        learnables_zero(&t.gradient, t.decoder.param_count);
+    }
+    trainer_free(&t);
+}
+
+/* How much of `whole` is in `sum`, and the cosine between them. */
+static void compare_sums(const float *whole, const float *sum, size_t count, double *share, double *cosine)
+{
+    double product = 0, squares[2] = {0, 0};
+    for (size_t i = 0; i < count; i++) {
+        product += (double)whole[i] * (double)sum[i];
+        squares[0] += (double)whole[i] * (double)whole[i];
+        squares[1] += (double)sum[i] * (double)sum[i];
+    }
+    *share = product / squares[0];
+    *cosine = product / sqrt(squares[0] * squares[1]);
+}
+
+/* A step that sees a part learns from it what the whole photo would: else Adam, which remembers whole photos,
+   would move what the part shows too far. Windows of SSIM end at a part's border. */
+static void parts_teach_their_share(void **state)
+{
+    (void)state;
+    enum { MOST = 1 << 20 };
+    float *feature[2], *networks[2];
+    double share, cosine;
+    for (int k = 0; k < 2; k++) {
+        feature[k] = mem_calloc(MOST, sizeof(float), "test", NULL);
+        networks[k] = mem_calloc(MOST, sizeof(float), "test", NULL);
+        add_up_parts(1 + k, feature[k], networks[k]);
+    }
+    compare_sums(feature[0], feature[1], MOST, &share, &cosine);
+    assert_true(fabs(share - 1) < 0.4 && cosine > 0.9);
+    compare_sums(networks[0], networks[1], MOST, &share, &cosine);
+    assert_true(fabs(share - 1) < 0.4 && cosine > 0.9);
+    for (int k = 0; k < 2; k++) {
+        mem_free(feature[k]);
+        mem_free(networks[k]);
+    }
+}
+
 /* A photo of four parts has had a look when each of them had one; a step of four views is four looks. */
 static void steps_leave_out_by_looks(void **state)
 {
@@ -2109,6 +2170,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(samples_are_pixels_of_the_photo),
         cmocka_unit_test(parts_make_up_the_photo),
         cmocka_unit_test(every_part_has_its_turn),
+        cmocka_unit_test(parts_teach_their_share),
         cmocka_unit_test(steps_leave_out_by_looks),
         cmocka_unit_test(picked_pixels_begin_anywhere),
         cmocka_unit_test(photos_keep_to_their_memory),

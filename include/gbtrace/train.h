@@ -81,7 +81,8 @@ typedef struct gbt_train_def {
     bool lossless; /* nothing but a setting of the run: gbt_compress() with `unless_lossless` leaves its model
                       as it is. With `resume`, true makes it so from now on */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
-                                                    stops meanwhile */
+                                                    stops meanwhile. With `resume`, where the last one that
+                                                    has passed has no score, after the first step */
     int eval_at_count;                           /* [0, GBT_TRAIN_MAX_EVALS]; times rise */
     const char *command;                         /* the command line, for the report. Default "" */
     uint32_t cookie_;                            /* set by gbt_train_def_default() */

@@ -120,15 +120,19 @@ typedef struct run_clock {
     save_beside *saving;
 } run_clock;
 
-static run_clock clock_start(const trainer *t, save_beside *saving)
+static run_clock clock_start(const trainer *t, const run_log *log, save_beside *saving)
 {
     run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds, .saving = saving};
-    while (c.next_eval < t->def.eval_at_count && t->def.eval_at_seconds[c.next_eval] <= t->seconds)
+    const double *at = t->def.eval_at_seconds,
+                 scored = log->evaluated_count > 0 ? log->evaluated_seconds[log->evaluated_count - 1] : 0;
+    while (c.next_eval < t->def.eval_at_count && at[c.next_eval] <= t->seconds)
         c.next_eval++;
     if (c.next_eval > 0 && t->step == 0)
         log_warn("eval_at: before the first step, which came after %.1f s, nothing can be scored: times left "
                  "out: %d",
                  t->seconds, c.next_eval);
+    else if (c.next_eval > 0 && at[c.next_eval - 1] > scored)
+        c.next_eval--; /* a signal came before that score, or in it */
     return c;
 }
 
@@ -214,7 +218,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
 static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                             gbt_error *err)
 {
-    run_clock c = clock_start(t, saving);
+    run_clock c = clock_start(t, log, saving);
     for (;;) {
         if (pace_segment(&t->pace, t->step) >= t->pace.known) {
             if (t->pace.known >= PACE_SEGMENTS)

@@ -161,6 +161,19 @@ static void a_run_goes_on_with_its_poses(void **state)
         mem_free(a.data);
         mem_free(b.data);
     }
+    /* And when it is finished: held-out photos are aligned at the end again. */
+    trainer t;
+    bool aligned;
+    def.iterations = 2 * STEPS;
+    def.stop_at_step = STEPS + 1;
+    train_fails(NULL, in_folder("parts"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    open_ok(&t, tiny, &def);
+    assert_ok(pose_file_read(in_folder("parts/poses.json"), &t.scene, &aligned, NULL));
+    assert_false(aligned);
+    for (size_t i = 0; i < t.scene.view_count; i++)
+        for (int k = 0; k < 3 && t.scene.views[i].is_test; k++)
+            assert_true(fabs(t.scene.views[i].camera.center[k] - t.poses.given[i].center[k]) < 1e-12);
+    trainer_free(&t);
 }
 
 /* What is saved on the way says that held-out photos are not aligned. */

@@ -142,7 +142,7 @@ static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *er
     const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
     if (peak <= t->def.memory)
         return GBT_OK;
-    GBT_TRY(save_all(t, paths, err));
+    GBT_TRY(save_surely(t, paths, err));
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
         "memory: %zu MiB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
@@ -159,20 +159,20 @@ static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *sa
 {
     if (is_of_data(status) && t->step > 0 && cluster_leads()) {
         save_finish(saving, NULL);
-        if (save_all(t, paths, NULL) == GBT_OK)
+        if (save_surely(t, paths, NULL) == GBT_OK)
             return base_fail(err, status, "%s; saved in %s", why->text, paths->checkpoint);
     }
     return base_fail(err, status, "%s", why->text);
 }
 
-/* Wait for a save beside the steps. One that failed may not fail again: all is saved as it is now. */
-static gbt_status end_saving(trainer *t, const run_paths *paths, save_beside *saving, gbt_error *err)
+/* Wait for a save beside the steps. False: it failed, and all is to be saved as it is now. */
+static bool end_saving(save_beside *saving)
 {
     gbt_error why = {0};
-    if (save_finish(saving, &why) == GBT_OK)
-        return GBT_OK;
-    log_warn("%s; saving once more", why.text);
-    return save_all(t, paths, err);
+    const bool fine = save_finish(saving, &why) == GBT_OK;
+    if (!fine)
+        log_warn("%s; saving once more", why.text);
+    return fine;
 }
 
 /* Log, evaluate, save, stop: whatever is due after a step. */
@@ -184,8 +184,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         budget_follow(&c->measured, t, t->step - 1, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
-    if (!save_is_under_way(c->saving))
-        GBT_TRY(end_saving(t, paths, c->saving, err));
+    const bool failed = !save_is_under_way(c->saving) && !end_saving(c->saving);
     GBT_TRY(check_memory(t, paths, err));
 
     bool stop = stop_signal_seen();
@@ -202,10 +201,10 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
     stop = stop || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);
-    if (stop || due) {
-        GBT_TRY(end_saving(t, paths, c->saving, err));
-        const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
-        GBT_TRY(at_once ? save_all(t, paths, err) : save_begin(c->saving, t, paths, err));
+    if (stop || due || failed) {
+        end_saving(c->saving);
+        const bool at_once = stop || failed || def->memory > 0; /* a copy is memory, too */
+        GBT_TRY(at_once ? save_surely(t, paths, err) : save_begin(c->saving, t, paths, err));
         c->last_save = t->seconds;
         if (stop)
             return base_fail(err, GBT_ERR_INTERRUPTED,
@@ -294,13 +293,13 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
-    GBT_TRY(end_saving(t, paths, saving, err));
-    GBT_TRY(save_all(t, paths, err));
+    end_saving(saving);
+    GBT_TRY(save_surely(t, paths, err));
     if (log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step))
         GBT_TRY(run_log_summary(log, t, paths->json, err));
     if (t->poses.count > 0) {
         GBT_TRY(finish_poses(t, err));
-        GBT_TRY(save_all(t, paths, err));
+        GBT_TRY(save_surely(t, paths, err));
     }
     return stop_signal_seen()
                ? base_fail(err, GBT_ERR_INTERRUPTED,
@@ -323,7 +322,7 @@ static gbt_status begin_files(trainer *t, const char *run, const run_paths *path
     /* data_places says where the data are that checkpoint and model name: no others, should this run end
        before it has saved. */
     if (def->resume && strcmp(strings->data, t->scene.folder) != 0)
-        GBT_TRY(save_all(t, paths, err));
+        GBT_TRY(save_surely(t, paths, err));
     return write_settings(t, run, paths, err);
 }
 

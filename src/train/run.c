@@ -261,18 +261,26 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
     return GBT_OK;
 }
 
-/* Each process has read the data by itself. */
-static gbt_status check_same_data(const trainer *t, gbt_error *err)
+/* Each process has read the data, and the checkpoint that it goes on from, by itself. */
+static gbt_status check_same_start(const trainer *t, gbt_error *err)
 {
-    uint64_t own[CHECKPOINT_DATA_HASHES], first[CHECKPOINT_DATA_HASHES];
-    checkpoint_hash_data(t, own);
-    memcpy(first, own, sizeof first);
-    cluster_broadcast(first, sizeof first);
-    const char *other = checkpoint_data_difference(own, first);
-    const gbt_status status =
-        other == NULL ? GBT_OK
-                      : base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
-                                  gbt_cluster_rank(), t->scene.folder, other);
+    struct {
+        uint64_t data[CHECKPOINT_DATA_HASHES], step, anchors, round_step;
+    } own = {.step = t->step, .anchors = t->anchors.count, .round_step = t->round_step}, first;
+    checkpoint_hash_data(t, own.data);
+    first = own;
+    cluster_broadcast(&first, sizeof first);
+    const char *other = checkpoint_data_difference(own.data, first.data);
+    gbt_status status = GBT_OK;
+    if (other != NULL)
+        status = base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
+                           gbt_cluster_rank(), t->scene.folder, other);
+    else if (own.step != first.step || own.anchors != first.anchors || own.round_step != first.round_step)
+        status = base_fail(err, GBT_ERR_FORMAT,
+                           "process %d goes on from another checkpoint (step %llu with %llu anchors, not "
+                           "%llu with %llu)",
+                           gbt_cluster_rank(), (unsigned long long)own.step, (unsigned long long)own.anchors,
+                           (unsigned long long)first.step, (unsigned long long)first.anchors);
     return cluster_agree(status, err);
 }
 
@@ -331,7 +339,7 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
                                 const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     GBT_TRY(cluster_agree(open_trainer(t, data, run, paths, def, strings, err), err));
-    GBT_TRY(check_same_data(t, err));
+    GBT_TRY(check_same_start(t, err));
     run_log log = {0};
     gbt_status status = GBT_OK;
     save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);

@@ -28,7 +28,8 @@ typedef struct gbt_train_def {
     gbt_distance_input distance;
     uint64_t iterations;   /* length of the run, with what was done before `resume`; 0: the budget decides */
     double budget_seconds; /* wall time for training, with what was spent before `resume`; used when
-                              iterations is 0. 0: 600, or with `resume` as long as the run was to be */
+                              iterations is 0 and pace is NULL. 0: 600, or with `resume` as long as the run
+                              was to be */
     int views;             /* photos that a step looks at, a power of two up to 64; results depend on it */
     const char *pace;      /* "n1,...,n20", or the list in train.json: iterations in each twentieth of the
                               schedule, as a budget run records them; NULL: as the budget allows */
@@ -76,12 +77,13 @@ typedef struct gbt_train_def {
     bool tensorboard;            /* also write `run`/events.out.tfevents.0.train: scalars of log.csv */
     bool resume;    /* go on from the run's last checkpoint, with its settings. Other `iterations`, or another
                        budget, give the run another length: schedules go on where a run of that length would
-                       be */
+                       be. A budget beside a pace does so only where the run has no pace */
     bool overwrite; /* train anew in a folder that holds a run, which is lost once the data have been read */
     bool lossless; /* nothing but a setting of the run: gbt_compress() with `unless_lossless` leaves its model
                       as it is. With `resume`, true makes it so from now on */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* held-out PSNR after so many seconds of training; the clock
-                                                    stops meanwhile */
+                                                    stops meanwhile. With `resume`, where the last one that
+                                                    has passed has no score, after the first step */
     int eval_at_count;                           /* [0, GBT_TRAIN_MAX_EVALS]; times rise */
     const char *command;                         /* the command line, for the report. Default "" */
     uint32_t cookie_;                            /* set by gbt_train_def_default() */

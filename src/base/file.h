@@ -40,7 +40,7 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
  *
  * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
  * we see. A device, a pipe or /dev/stdout is written to as it is. Who may read and write the file stays as it
- * was; a link is replaced, and what it leads to stays.
+ * was, but that its owner may write it; a link is replaced, and what it leads to stays.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 

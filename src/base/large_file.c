@@ -53,7 +53,7 @@ gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
                           : open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
-    if (!stream && stat(path, &old) == 0) /* a private file stays one; the next write can open this one */
+    if (!stream && stat(path, &old) == 0) /* private stays private; who appends next, as to log.csv, can */
         fchmod(fd, (old.st_mode & 0777) | S_IWUSR);
     out->open = true;
     out->descriptor = fd;

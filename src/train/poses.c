@@ -110,6 +110,8 @@ void poses_pack(const poses *p, const scene *s)
 void poses_unpack(const poses *p, scene *s)
 {
     for (size_t i = 0; i < s->view_count; i++) {
+        if (s->views[i].is_test)
+            continue;
         memcpy(s->views[i].camera.rotation, p->packed + i * POSE_PACKED, 9 * sizeof(double));
         memcpy(s->views[i].camera.center, p->packed + i * POSE_PACKED + 9, 3 * sizeof(double));
     }

@@ -61,7 +61,8 @@ void poses_step(poses *p, scene *s, const size_t *train_views, size_t index,
  */
 double poses_rate(size_t count, double progress, double step);
 
-/** The poses of all views of `s` to p->packed, and back. */
+/** The poses of all views of `s` to p->packed; and back, but of held-out ones: a finished run aligned these
+   to the scene as it was then. */
 void poses_pack(const poses *p, const scene *s);
 void poses_unpack(const poses *p, scene *s);
 

@@ -103,7 +103,8 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
         log_info(
             "%s: %llu steps done; training goes on to step %llu, with the schedules of a run of that length",
             run, (unsigned long long)t->step, (unsigned long long)own->iterations);
-    } else if (asked->iterations == 0 && asked->budget_seconds > 0 && asked->pace == NULL &&
+    } else if (asked->iterations == 0 && asked->budget_seconds > 0 &&
+               (asked->pace == NULL || own->pace == NULL) &&
                !(by_time && asked->budget_seconds == own->budget_seconds)) {
         if (asked->budget_seconds <= t->seconds)
             return base_fail(

@@ -14,8 +14,9 @@ gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err)
  * Make of `t` what it was when the run's last checkpoint was made.
  *
  * Settings come from the checkpoint; what `def` asks for beside is warned of. Only the length may change:
- * `def->iterations`, else `def->budget_seconds`, where it is neither 0 nor the run's own. The schedule then
- * goes on where a run of that length would be after as many steps, or after as much time.
+ * `def->iterations`, else `def->budget_seconds`, where it is neither 0 nor the run's own; a run by a pace
+ * keeps that when `def` has a pace, too. The schedule then goes on where a run of that length would be after
+ * as many steps, or after as much time.
  *
  * @param data     [in] the data set; NULL: where the run has it
  * @param latest   [in] the checkpoint; where it is missing, `previous`

@@ -121,15 +121,19 @@ typedef struct run_clock {
     save_beside *saving;
 } run_clock;
 
-static run_clock clock_start(const trainer *t, save_beside *saving)
+static run_clock clock_start(const trainer *t, const run_log *log, save_beside *saving)
 {
     run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds, .saving = saving};
-    while (c.next_eval < t->def.eval_at_count && t->def.eval_at_seconds[c.next_eval] <= t->seconds)
+    const double *at = t->def.eval_at_seconds,
+                 scored = log->evaluated_count > 0 ? log->evaluated_seconds[log->evaluated_count - 1] : 0;
+    while (c.next_eval < t->def.eval_at_count && at[c.next_eval] <= t->seconds)
         c.next_eval++;
     if (c.next_eval > 0 && t->step == 0)
         log_warn("eval_at: before the first step, which came after %.1f s, nothing can be scored: times left "
                  "out: %d",
                  t->seconds, c.next_eval);
+    else if (c.next_eval > 0 && at[c.next_eval - 1] > scored)
+        c.next_eval--; /* a signal came before that score, or in it */
     return c;
 }
 
@@ -139,7 +143,7 @@ static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *er
     const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
     if (peak <= t->def.memory)
         return GBT_OK;
-    GBT_TRY(save_all(t, paths, err));
+    GBT_TRY(save_surely(t, paths, err));
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
         "memory: %zu MiB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
@@ -156,20 +160,20 @@ static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *sa
 {
     if (is_of_data(status) && t->step > 0 && cluster_leads()) {
         save_finish(saving, NULL);
-        if (save_all(t, paths, NULL) == GBT_OK)
+        if (save_surely(t, paths, NULL) == GBT_OK)
             return base_fail(err, status, "%s; saved in %s", why->text, paths->checkpoint);
     }
     return base_fail(err, status, "%s", why->text);
 }
 
-/* Wait for a save beside the steps. One that failed may not fail again: all is saved as it is now. */
-static gbt_status end_saving(trainer *t, const run_paths *paths, save_beside *saving, gbt_error *err)
+/* Wait for a save beside the steps. False: it failed, and all is to be saved as it is now. */
+static bool end_saving(save_beside *saving)
 {
     gbt_error why = {0};
-    if (save_finish(saving, &why) == GBT_OK)
-        return GBT_OK;
-    log_warn("%s; saving once more", why.text);
-    return save_all(t, paths, err);
+    const bool fine = save_finish(saving, &why) == GBT_OK;
+    if (!fine)
+        log_warn("%s; saving once more", why.text);
+    return fine;
 }
 
 /* Log, evaluate, save, stop: whatever is due after a step. */
@@ -181,8 +185,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         budget_follow(&c->measured, t, t->step - 1, report);
     t->seconds = c->offset + clock_wall() - c->begin - c->paused;
     run_log_step(log, t, report);
-    if (!save_is_under_way(c->saving))
-        GBT_TRY(end_saving(t, paths, c->saving, err));
+    const bool failed = !save_is_under_way(c->saving) && !end_saving(c->saving);
     GBT_TRY(check_memory(t, paths, err));
 
     bool stop = stop_signal_seen();
@@ -199,10 +202,10 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
     stop = stop || (def->stop_at_step > 0 && t->step >= def->stop_at_step);
     const bool due = def->save_every_seconds > 0 && t->seconds - c->last_save >= def->save_every_seconds &&
                      !save_is_under_way(c->saving);
-    if (stop || due) {
-        GBT_TRY(end_saving(t, paths, c->saving, err));
-        const bool at_once = stop || def->memory > 0; /* a copy is memory, too */
-        GBT_TRY(at_once ? save_all(t, paths, err) : save_begin(c->saving, t, paths, err));
+    if (stop || due || failed) {
+        end_saving(c->saving);
+        const bool at_once = stop || failed || def->memory > 0; /* a copy is memory, too */
+        GBT_TRY(at_once ? save_surely(t, paths, err) : save_begin(c->saving, t, paths, err));
         c->last_save = t->seconds;
         if (stop)
             return base_fail(err, GBT_ERR_INTERRUPTED,
@@ -215,7 +218,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
 static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                             gbt_error *err)
 {
-    run_clock c = clock_start(t, saving);
+    run_clock c = clock_start(t, log, saving);
     for (;;) {
         if (pace_segment(&t->pace, t->step) >= t->pace.known) {
             if (t->pace.known >= PACE_SEGMENTS)
@@ -259,18 +262,26 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
     return GBT_OK;
 }
 
-/* Each process has read the data by itself. */
-static gbt_status check_same_data(const trainer *t, gbt_error *err)
+/* Each process has read the data, and the checkpoint that it goes on from, by itself. */
+static gbt_status check_same_start(const trainer *t, gbt_error *err)
 {
-    uint64_t own[CHECKPOINT_DATA_HASHES], first[CHECKPOINT_DATA_HASHES];
-    checkpoint_hash_data(t, own);
-    memcpy(first, own, sizeof first);
-    cluster_broadcast(first, sizeof first);
-    const char *other = checkpoint_data_difference(own, first);
-    const gbt_status status =
-        other == NULL ? GBT_OK
-                      : base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
-                                  gbt_cluster_rank(), t->scene.folder, other);
+    struct {
+        uint64_t data[CHECKPOINT_DATA_HASHES], step, anchors, round_step;
+    } own = {.step = t->step, .anchors = t->anchors.count, .round_step = t->round_step}, first;
+    checkpoint_hash_data(t, own.data);
+    first = own;
+    cluster_broadcast(&first, sizeof first);
+    const char *other = checkpoint_data_difference(own.data, first.data);
+    gbt_status status = GBT_OK;
+    if (other != NULL)
+        status = base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
+                           gbt_cluster_rank(), t->scene.folder, other);
+    else if (own.step != first.step || own.anchors != first.anchors || own.round_step != first.round_step)
+        status = base_fail(err, GBT_ERR_FORMAT,
+                           "process %d goes on from another checkpoint (step %llu with %llu anchors, not "
+                           "%llu with %llu)",
+                           gbt_cluster_rank(), (unsigned long long)own.step, (unsigned long long)own.anchors,
+                           (unsigned long long)first.step, (unsigned long long)first.anchors);
     return cluster_agree(status, err);
 }
 
@@ -291,13 +302,13 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
-    GBT_TRY(end_saving(t, paths, saving, err));
-    GBT_TRY(save_all(t, paths, err));
+    end_saving(saving);
+    GBT_TRY(save_surely(t, paths, err));
     if (log->all.steps > 0 || !run_log_is_of_step(paths->json, t->step))
         GBT_TRY(run_log_summary(log, t, paths->json, err));
     if (t->poses.count > 0) {
         GBT_TRY(finish_poses(t, err));
-        GBT_TRY(save_all(t, paths, err));
+        GBT_TRY(save_surely(t, paths, err));
     }
     return stop_signal_seen()
                ? base_fail(err, GBT_ERR_INTERRUPTED,
@@ -320,7 +331,7 @@ static gbt_status begin_files(trainer *t, const char *run, const run_paths *path
     /* data_places says where the data are that checkpoint and model name: no others, should this run end
        before it has saved. */
     if (def->resume && strcmp(strings->data, t->scene.folder) != 0)
-        GBT_TRY(save_all(t, paths, err));
+        GBT_TRY(save_surely(t, paths, err));
     return write_settings(t, run, paths, err);
 }
 
@@ -329,7 +340,7 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
                                 const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     GBT_TRY(cluster_agree(open_trainer(t, data, run, paths, def, strings, err), err));
-    GBT_TRY(check_same_data(t, err));
+    GBT_TRY(check_same_start(t, err));
     run_log log = {0};
     gbt_status status = GBT_OK;
     save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);

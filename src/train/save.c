@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "io/model_file.h"
@@ -78,14 +79,23 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
 gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err)
 {
     gbt_status status[4] = {checkpoint_save(t, paths->checkpoint, err)};
-    if (t->exposures.count > 0)
-        status[1] = save_exposures(t, paths->exposure, err);
-    if (t->poses.count > 0)
-        status[2] = pose_file_write(&t->scene, t->poses.held_out_aligned, paths->poses, err);
-    status[3] = save_model(t, paths->model, err);
+    status[1] = save_model(t, paths->model, err);
+    if (status[1] == GBT_OK && t->exposures.count > 0)
+        status[2] = save_exposures(t, paths->exposure, err);
+    if (status[1] == GBT_OK && t->poses.count > 0)
+        status[3] = pose_file_write(&t->scene, t->poses.held_out_aligned, paths->poses, err);
     for (int i = 0; i < 4; i++)
         GBT_TRY(status[i]);
     return GBT_OK;
+}
+
+gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err)
+{
+    gbt_error why = {0};
+    if (save_all(t, paths, &why) == GBT_OK)
+        return GBT_OK;
+    log_warn("%s; saving once more", why.text);
+    return save_all(t, paths, err);
 }
 
 /* ---- beside the steps ---- */
@@ -184,7 +194,7 @@ static void write_copy(void *context)
 gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err)
 {
     if (copy_trainer(t, &s->copy, &s->memory, NULL) != GBT_OK)
-        return save_all(t, paths, err);
+        return save_surely(t, paths, err);
     s->paths = paths;
     beside_start(&s->job, write_copy, s);
     return GBT_OK;

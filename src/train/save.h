@@ -14,9 +14,12 @@ typedef struct run_paths {
         checkpoint_previous[RUN_PATH_SIZE];
 } run_paths;
 
-/** Write all of them, also those after one that cannot be written: the checkpoint is 20 times as large as the
-    model. The first failure. */
+/** Write all of them. The model also where the checkpoint, which is 20 times as large, cannot be written;
+    exposures and poses only beside a model of the same step. The first failure. */
 gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err);
+
+/** The same, and once more, with a warning, where it fails: the reason may be gone. The second failure. */
+gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A save that is written while steps go on: of a copy of all that changes. Start from {0}. */
 typedef struct save_beside {

@@ -66,6 +66,13 @@ on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd other ;; esac; exec
 code=$?
 [ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 reads other data (data has photos of the same names, but other pictures)$' err && [ ! -e differs/config ]
 report $? "data that differ" "code $code: $(cat out err)"
+"$program" train data -o forked --views 2 --iterations 30 --stop-at-step 6 --quiet >out 2>&1
+mkdir fork && cp -r data forked fork
+"$program" train -o forked --resume --stop-at-step 12 --quiet >>out 2>&1
+on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd fork ;; esac; exec "$@"' sh "$program" train -o forked --resume --quiet >>out 2>err
+code=$?
+[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 goes on from another checkpoint (step 6 with [0-9]* anchors, not 12 with [0-9]*)$' err
+report $? "checkpoints that differ" "code $code: $(cat out err)"
 on 2 "$program" train data -o "$work/killed" --views 2 --iterations 1000000 --save-every 1s --quiet >out 2>err &
 started=$!
 while [ ! -e killed/checkpoints/last.gbt ] && kill -0 $started; do sleep 0.1; done 2>/dev/null

@@ -8,6 +8,7 @@
 #include "folder.h"
 
 #include "gbtrace/make_scene.h"
+#include "gbtrace/progress.h"
 #include "train/held_out.h"
 #include "train/trainer.h"
 
@@ -73,6 +74,14 @@ static inline void train_fails(const char *data, const char *run, const gbt_trai
     if (status != wanted || err.status != wanted || strstr(err.text, says) == NULL ||
         strchr(err.text, '\n') != NULL)
         fail_msg("wanted status %d and \"%s\", got %d: %s", (int)wanted, says, (int)status, err.text);
+}
+
+/* For gbt_listen(): `folder`, which was in the way of what could not be written, is gone when it is written
+   once more. */
+static inline void remove_at_warning(const gbt_event *event, void *folder)
+{
+    if (event->kind == GBT_EVENT_WARNING && strstr(event->text, "saving once more") != NULL)
+        assert_int_equal(rmdir(folder), 0);
 }
 
 static inline void open_ok(trainer *t, const char *data, const gbt_train_def *def)

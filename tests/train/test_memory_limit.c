@@ -89,6 +89,22 @@ static void too_little(void **state)
     assert_false(file_exists(in_folder("none/model.gbt")));
 }
 
+/* There saves are made at once, not beside the steps. */
+static void a_save_that_failed_is_made_once_more(void **state)
+{
+    (void)state;
+    char in_its_way[PATH_SIZE];
+    snprintf(in_its_way, sizeof in_its_way, "%s", in_folder("once/checkpoints/.last.gbt.tmp"));
+    assert_ok(file_make_folder(in_its_way, NULL));
+    gbt_train_def def = run_def();
+    def.memory = (size_t)4 << 30;
+    def.save_every_seconds = 1e-6;
+    gbt_listen(remove_at_warning, in_its_way);
+    train_ok(tiny, in_folder("once"), &def);
+    gbt_listen(NULL, NULL);
+    assert_false(file_exists(in_its_way));
+}
+
 static void what_it_takes(void **state)
 {
     (void)state;
@@ -129,7 +145,8 @@ static void what_it_takes(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_same_run_in_less_memory),
-                                       cmocka_unit_test(too_little), cmocka_unit_test(what_it_takes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_same_run_in_less_memory), cmocka_unit_test(too_little),
+        cmocka_unit_test(a_save_that_failed_is_made_once_more), cmocka_unit_test(what_it_takes)};
     return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

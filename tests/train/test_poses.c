@@ -8,8 +8,10 @@
 
 #include "base/rng.h"
 #include "base/vec.h"
+#include "gbtrace/progress.h"
 #include "run/loaded_run.h"
 #include "train/align.h"
+#include "train/checkpoint.h"
 #include "train/pose_file.h"
 
 /* The small turn from one camera to another, in world axes: the antisymmetric part of A^T B. */
@@ -159,6 +161,19 @@ static void a_run_goes_on_with_its_poses(void **state)
         mem_free(a.data);
         mem_free(b.data);
     }
+    /* And when it is finished: held-out photos are aligned at the end again. */
+    trainer t;
+    bool aligned;
+    def.iterations = 2 * STEPS;
+    def.stop_at_step = STEPS + 1;
+    train_fails(NULL, in_folder("parts"), &def, GBT_ERR_INTERRUPTED, "stopped");
+    open_ok(&t, tiny, &def);
+    assert_ok(pose_file_read(in_folder("parts/poses.json"), &t.scene, &aligned, NULL));
+    assert_false(aligned);
+    for (size_t i = 0; i < t.scene.view_count; i++)
+        for (int k = 0; k < 3 && t.scene.views[i].is_test; k++)
+            assert_true(fabs(t.scene.views[i].camera.center[k] - t.poses.given[i].center[k]) < 1e-12);
+    trainer_free(&t);
 }
 
 /* What is saved on the way says that held-out photos are not aligned. */
@@ -179,6 +194,52 @@ static void scoring_leaves_no_pose_behind(void **state)
         assert_true(t.scene.views[i].is_test ==
                     (memcmp(&t.scene.views[i].camera, &t.poses.given[i], sizeof(gbt_camera)) == 0));
     trainer_free(&t);
+}
+
+static void *signal_soon(void *unused)
+{
+    (void)unused;
+    usleep(30000);
+    kill(getpid(), SIGTERM);
+    return NULL;
+}
+
+static void start_signal(const gbt_event *event, void *thread)
+{
+    if (event->kind == GBT_EVENT_MESSAGE && strstr(event->text, "photos to train on") != NULL)
+        assert_int_equal(pthread_create(thread, NULL, signal_soon, NULL), 0);
+}
+
+/* Aligning makes the score take some hundred times as long as the step before it, so the signal comes while
+   it is made; on a very slow machine before it, with the same end. */
+static void a_score_that_a_signal_stops_is_made_later(void **state)
+{
+    (void)state;
+    const char *run = in_folder("unscored"), *last = in_folder("unscored/checkpoints/last.gbt");
+    pthread_t thread;
+    trainer t;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    def.eval_split = "every=2";
+    def.stop_at_step = STEPS / 2;
+    train_fails(tiny, run, &def, GBT_ERR_INTERRUPTED, "after step 30");
+    open_ok(&t, tiny, &def);
+    assert_ok(checkpoint_load(&t, last, NULL));
+    def.resume = true;
+    def.stop_at_step = 0;
+    def.eval_at_seconds[0] = t.seconds + 1e-9;
+    def.eval_at_count = 1;
+    trainer_free(&t);
+    signal(SIGTERM, SIG_IGN); /* should it come too late */
+    gbt_listen(start_signal, &thread);
+    train_fails(NULL, run, &def, GBT_ERR_INTERRUPTED, "after step 31; saved in ");
+    gbt_listen(NULL, NULL);
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    signal(SIGTERM, SIG_DFL);
+    train_ok(NULL, run, &def);
+    const file_bytes summary = read_bytes(in_folder("unscored/train.json"));
+    assert_non_null(strstr((const char *)summary.data, "\"step\": 32,"));
+    mem_free(summary.data);
 }
 
 /* A signal as soon as the run has been summed up, which is when held-out photos are aligned. */
@@ -290,6 +351,7 @@ int main(void)
         cmocka_unit_test(disturbed_poses_come_back),
         cmocka_unit_test(a_run_goes_on_with_its_poses),
         cmocka_unit_test(scoring_leaves_no_pose_behind),
+        cmocka_unit_test(a_score_that_a_signal_stops_is_made_later),
         cmocka_unit_test(held_out_photos_are_aligned_after_a_signal),
         cmocka_unit_test(whoever_opens_the_run_has_them),
         cmocka_unit_test(what_is_no_pose_is_refused),

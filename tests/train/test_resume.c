@@ -303,7 +303,8 @@ static void keep_warnings(const gbt_event *event, void *context)
         snprintf(kept + strlen(kept), PATH_SIZE - strlen(kept), "%s\n", event->text);
 }
 
-/* With both, the pace is what counts; also when the run is gone on with by the same options. */
+/* With both, the pace is what counts; also when the run is gone on with by the same options. A run without a
+   pace takes none, so there the budget counts. */
 static void a_pace_wins_over_a_budget(void **state)
 {
     (void)state;
@@ -318,6 +319,11 @@ static void a_pace_wins_over_a_budget(void **state)
     on.pace = def.pace;
     train_ok(tiny, in_folder("by pace in two"), &on);
     assert_same_file(in_folder("by pace/model.gbt"), in_folder("by pace in two/model.gbt"));
+    def = run_def();
+    train_ok(tiny, in_folder("by steps"), &def);
+    on.budget_seconds = number_of(in_folder("by steps"), "train_seconds") + 0.1;
+    train_ok(tiny, in_folder("by steps"), &on);
+    assert_true(number_of(in_folder("by steps"), "iterations") > STEPS);
 }
 
 static void a_budget_that_reading_takes_is_told(void **state)

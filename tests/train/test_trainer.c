@@ -1120,8 +1120,24 @@ static void a_vanished_photo_is_named(void **state)
     train_ok(data, run, &on);
 }
 
-/* A limit on file size stands for the full disk: write() fails half way. The model, which is smaller, is
-   written. */
+/* A limit on file size stands for the full disk: write() fails half way. */
+static void checkpoint_does_not_fit(const char *run, const gbt_train_def *def, size_t bytes)
+{
+    fflush(NULL);
+    struct rlimit limit;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+    const struct rlimit small = {bytes, limit.rlim_max};
+    void (*old_action)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    gbt_error err = {0};
+    const gbt_status status = gbt_train(tiny, run, def, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+    signal(SIGXFSZ, old_action);
+    if (status != GBT_ERR_IO || strstr(err.text, "last.gbt") == NULL)
+        fail_msg("wanted an error of the checkpoint, got %d: %s", (int)status, err.text);
+}
+
+/* The model, which is smaller, is written. */
 static void a_full_disk_leaves_the_old_checkpoint(void **state)
 {
     (void)state;
@@ -1135,20 +1151,9 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     file_bytes old_model = read_bytes(in_folder("full/model.gbt"));
     mem_free(old_model.data);
 
-    fflush(NULL);
-    struct rlimit limit;
-    assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
-    const struct rlimit small = {(old_model.count + old.count) / 2, limit.rlim_max};
-    void (*old_action)(int) = signal(SIGXFSZ, SIG_IGN);
-    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
     def.resume = true;
     def.stop_at_step = 20;
-    gbt_error err = {0};
-    const gbt_status status = gbt_train(tiny, in_folder("full"), &def, &err);
-    assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
-    signal(SIGXFSZ, old_action);
-    if (status != GBT_ERR_IO || strstr(err.text, "last.gbt") == NULL)
-        fail_msg("wanted an error of the checkpoint, got %d: %s", (int)status, err.text);
+    checkpoint_does_not_fit(in_folder("full"), &def, (old_model.count + old.count) / 2);
 
     /* Whole, and under its own name; no half-written file beside it. */
     assert_true(file_exists(last) && is_same_file(last, copy));
@@ -1161,26 +1166,54 @@ static void a_full_disk_leaves_the_old_checkpoint(void **state)
     assert_same_file(straight_run(), in_folder("full/model.gbt"));
 }
 
-/* Makes room for what could not be written. */
-static void remove_at_warning(const gbt_event *event, void *folder)
+/* A disk that has room for the poses, but not for the model that they are of. */
+static void poses_stay_with_their_model(void **state)
 {
-    if (event->kind == GBT_EVENT_WARNING && strstr(event->text, "saving once more") != NULL)
-        assert_int_equal(rmdir(folder), 0);
+    (void)state;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    def.stop_at_step = 10;
+    train_fails(tiny, in_folder("posed"), &def, GBT_ERR_INTERRUPTED, "after step 10");
+    copy_file(in_folder("posed/model.gbt"), in_folder("posed_copy.gbt"));
+    copy_file(in_folder("posed/poses.json"), in_folder("posed_copy.json"));
+    file_bytes large = read_bytes(in_folder("posed/model.gbt")),
+               small = read_bytes(in_folder("posed/poses.json"));
+    mem_free(large.data);
+    mem_free(small.data);
+    assert_true(large.count > small.count + 2000);
+    def.resume = true;
+    def.stop_at_step = 20;
+    checkpoint_does_not_fit(in_folder("posed"), &def, (large.count + small.count) / 2);
+    assert_same_file(in_folder("posed/model.gbt"), in_folder("posed_copy.gbt"));
+    assert_same_file(in_folder("posed/poses.json"), in_folder("posed_copy.json"));
 }
 
+/* Beside the steps, at a stop, at the end. */
 static void a_save_that_failed_is_made_once_more(void **state)
 {
     (void)state;
-    char in_its_way[PATH_SIZE];
-    snprintf(in_its_way, sizeof in_its_way, "%s", in_folder("once/checkpoints/.last.gbt.tmp"));
-    assert_ok(file_make_folder(in_its_way, NULL));
-    gbt_train_def def = run_def();
-    def.save_every_seconds = 1e-6;
-    gbt_listen(remove_at_warning, in_its_way);
-    train_ok(tiny, in_folder("once"), &def);
-    be_quiet();
-    assert_false(file_exists(in_its_way));
-    assert_same_file(straight_run(), in_folder("once/model.gbt"));
+    static const struct {
+        double save_every;
+        uint64_t stop_at_step;
+    } cases[] = {{1e-6, 0}, {0, STEPS / 2}, {0, 0}};
+    for (int i = 0; i < 3; i++) {
+        const char *run = in_folder("once%d", i);
+        char in_its_way[PATH_SIZE];
+        snprintf(in_its_way, sizeof in_its_way, "%s/checkpoints/.last.gbt.tmp", run);
+        assert_ok(file_make_folder(in_its_way, NULL));
+        gbt_train_def def = run_def();
+        def.save_every_seconds = cases[i].save_every;
+        def.stop_at_step = cases[i].stop_at_step;
+        gbt_listen(remove_at_warning, in_its_way);
+        if (def.stop_at_step > 0)
+            train_fails(tiny, run, &def, GBT_ERR_INTERRUPTED, "after step 30; saved in ");
+        else
+            train_ok(tiny, run, &def);
+        be_quiet();
+        assert_false(file_exists(in_its_way));
+        resume_ok(run);
+        assert_same_file(straight_run(), in_folder("once%d/model.gbt", i));
+    }
 }
 
 static void write_file(const char *path, const unsigned char *data, size_t count)
@@ -2208,6 +2241,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_run_is_overwritten_only_when_asked),
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
+        cmocka_unit_test(poses_stay_with_their_model),
         cmocka_unit_test(a_save_that_failed_is_made_once_more),
         cmocka_unit_test(a_damaged_checkpoint_is_refused),
         cmocka_unit_test(the_log_goes_back_with_the_checkpoint),

@@ -394,6 +394,9 @@ for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candid
 done
 grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tile"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
+printf '{"origin": [0, 0, 0.5], "target": [0, 0, 2], "up": [0, 1, 0], "fov_x_deg": 40, "width": 40, "height": 32}' >inside.json
+"$program" bench trace --model gaussians.ply --camera inside.json --repeats 1 --json inside-bench.json >out 2>err && grep -q '"gaussians": 60,' inside-bench.json
+report $? "bench takes plain Gaussians behind the camera too" "$(cat err out)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
 prints "options of 0 leave it to the preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0 --alpha-max 0 --t-min 0
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9

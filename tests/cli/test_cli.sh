@@ -403,6 +403,7 @@ prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.00
 misuse 2 '--kernel: "tile,tile" (wanted list, packet, tile, single, embree or splats, or some of them with commas between)' $bench --kernel tile,tile
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "bench: bad alpha_max (wanted alpha_min, 0.5, or more, got 0.4)" $bench --alpha-min 0.5 --alpha-max 0.4
+misuse 2 "bench: bad alpha_min (wanted a number in [1e-30, 1), got 1e-31)" $bench --alpha-min 1e-31
 misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
 mkdir alone && cp gaussians.ply alone && "$program" export gaussians.ply alone/gaussians.splat >out 2>err
 for study in speed crosscheck; do

@@ -125,14 +125,6 @@ report $? "a result folder of photos at half size" "$(cat err out)"
 sed -i "s/images='images'/images='images_2'/; s/resolution=2/resolution=-1/" result/cfg_args && "$program" render result -o reduced --format exr >out 2>err && "$program" render result -o divided --format exr -d 2 >>out 2>>err &&
     grep -q "images='images_2'.*resolution=-1" result/cfg_args && "$program" compare divided/*0.exr reduced/*0.exr >>out 2>>err
 report $? "a result folder of photos that were divided before" "$(cat err out result/cfg_args)"
-echo '{"origin": [0, 0, -4], "target": [0, 0, 0], "fov_x_deg": 60, "width": 3600, "height": 36}' >wide.json
-"$program" render run --camera wide.json -o wide >out 2>err
-echo '{"fl_x": 3118, "w": 3600, "h": 36, "frames": [{"file_path": "wide.png", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4]]}]}' >wide/transforms.json
-for wanted in -1:1600 1:1800; do
-    sed -i "s/resolution=[-0-9]*/resolution=${wanted%:*}/" result/cfg_args && "$program" render result --data wide --split all -o wide-drawn >>out 2>>err &&
-        "$program" compare wide-drawn/wide.png wide-drawn/wide.png --json | grep -q "\"width\": ${wanted#*:},"
-    report $? "large ones at resolution=${wanted%:*}" "$(cat err out result/cfg_args; ls wide wide-drawn)"
-done
 "$program" train made -o three-quarters --iterations 3 --downscale 1.33333 --quiet >out 2>err && "$program" export three-quarters narrow/ --refine 0 >>out 2>>err &&
     grep -q 'resolution=24, ' narrow/cfg_args && grep -q '"width": 24,' narrow/cameras.json && "$program" render narrow -o narrow-drawn >>out 2>>err &&
     "$program" compare narrow-drawn/0000.png narrow/test/*/renders/00000.png --json | grep -q '"width": 24, "height": 18, "psnr": 100,'
@@ -151,6 +143,10 @@ report $? "the scores in a result folder are those of its pictures" "$(cat score
     "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
     grep -q '1600 x 10' err && grep -q '1920 x 12' err
 report $? "wide photos of plain Gaussians" "$(cat err out)"
+"$program" make-scene tabletop -o wider --width 3600 --height 24 --views 3 --points 20 --samples 1 --quiet >out 2>err && "$program" render result -o at-most --data wider >>out 2>>err &&
+    sed -i 's/resolution=-1/resolution=1/' result/cfg_args && "$program" render result -o at-half --data wider >>out 2>>err && ! "$program" compare at-most/0000.png at-half/0000.png >>out 2>>err &&
+    grep -q '1600 x 11' err && grep -q '1800 x 12' err
+report $? "wide photos of a result folder that were divided before" "$(cat err out result/cfg_args)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
 mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,%s],[0,0,0,1]]}' "$1" "$2" "$3"; }

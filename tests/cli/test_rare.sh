@@ -82,7 +82,7 @@ mkdir -p mine/scene && holds "the demo leaves data that are no scene of its own 
 report $? "nor anything in their folder"
 mkdir -p shop/scene/sparse/0/images.bin && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
 [ $? = 4 ] && [ ! -e shop/scene/sparse/0/points3D.bin ] && rm -r shop/scene/sparse # bench/ looks for what is written last
-report $? "a scene that was not finished" "$(cat out; ls shop/scene/sparse/0)"
+report $? "a scene that was not finished" "$(cat out; ls -R shop/scene)"
 mkdir -p rolled-part/points.ply && "$program" make-scene tabletop -o rolled-part --lens rolling --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
 [ $? = 4 ] && [ ! -e rolled-part/transforms.json ]
 report $? "nor one of moving cameras" "$(cat out; ls rolled-part)"

@@ -33,7 +33,8 @@ def call(*words):
 
 def make_scene(name, *words):
     """The courtyard as photos; 76,800 pixels each, whatever the lens."""
-    if not os.path.exists(os.path.join(args.output, name, "SCENE.md")):
+    last = "transforms.json" if "rolling" in words else "sparse/0/points3D.bin"  # of what make-scene writes
+    if not os.path.exists(os.path.join(args.output, name, last)):
         call("make-scene", "courtyard", "-o", name, "--views", "100", *words)
     return name
 

@@ -19,11 +19,11 @@ typedef struct lab_bench_def {
     int repeats;        /* timed passes after one warm-up; the median is reported. Default 5 */
     bool check; /* compare with the double reference on every 8th pixel in both directions. Default false */
     const char *json; /* where to write the figures; NULL: nowhere */
-    float alpha_min;  /* smallest response that counts, in (0, 1); 0 or NaN: that of the run, 1/255 for a .ply
-                       */
+    float alpha_min;  /* smallest response that counts, in [1e-30, 1); 0 or NaN: that of the run, 1/255 for a
+                         .ply */
     float alpha_max;  /* alpha is cut here, in [alpha_min, 1); 0 or NaN: that of the run, 0.99 for a .ply */
-    float t_min; /* stop before transmittance falls below this, in (0, 1); 0 or NaN: that of the run, 1e-4 for
-                    a .ply */
+    float t_min; /* stop before transmittance falls below this, in [1e-30, 1); 0 or NaN: that of the run, 1e-4
+                    for a .ply */
     gbt_preset preset;  /* the three numbers above win over it. Default GBT_PRESET_AS_TRAINED */
     const char *kernel; /* "list" (default, and NULL), "packet", "tree", "single", "embree", or "splats" of
                            the same; or some of them, as "list,tree": measured in turn and compared with the

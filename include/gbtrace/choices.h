@@ -47,10 +47,10 @@ typedef enum gbt_alpha {
 
 /** What is behind everything. */
 typedef enum gbt_background {
-    GBT_BACKGROUND_CONSTANT, /* one colour: what photos with an alpha channel lie on, else the mean of the
-                                sparse points */
-    GBT_BACKGROUND_SKY       /* colours by direction, learned: harmonics to degree 3. Not behind photos with
-                                an alpha channel */
+    GBT_BACKGROUND_CONSTANT, /* one colour: what photos lie on that are transparent in places, else the mean
+                                of the sparse points */
+    GBT_BACKGROUND_SKY       /* colours by direction, learned: harmonics to degree 3. Not behind photos that
+                                are transparent in places */
 } gbt_background;
 #define GBT_BACKGROUND_NAMES "constant|sky"
 

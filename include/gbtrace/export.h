@@ -19,8 +19,8 @@ typedef struct gbt_export_def {
     int gaussians;    /* at most so many in a file made from a model, the backdrop among them: those that the
                                training views blend most; 0: all. Default 0 */
     bool backdrop; /* add the model's background as a sphere of 1000 Gaussians around everything: files have
-                      no background, and viewers draw on black. Not where photos have an alpha channel.
-                      Default true */
+                      no background, and viewers draw on black. Not where photos are transparent in
+                      places. Default true */
     const char *data;  /* data set with the training cameras; NULL: the one it was trained on. Default NULL */
     const char *json;  /* also write the figures here; NULL: nowhere. Default NULL */
     const char *lpips; /* .safetensors file of a network: a result folder gets LPIPS too (docs/metrics.md).

@@ -50,8 +50,8 @@ const char *gbt_make_scene_summary(const char *name);
  * Render a procedural scene and write it as a data set that any COLMAP reader takes.
  *
  * Files: images/NNNN.png (8 bit, display-referred), sparse/0/{cameras,images,points3D}.bin (for rolling
- * shutters transforms.json and points.ply, as instant-ngp reads them), SCENE.md (what it
- * shows and how it was made) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the
+ * shutters points.ply and transforms.json, as instant-ngp reads them), SCENE.md (what it shows and how it
+ * was made; written first) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the
  * ray through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
  * nothing is hit; with def->gaussians, gaussians.ply: plain Gaussians of degree 3, 248 bytes each, spread
  * evenly over the surfaces in the colours that are seen from in front. Existing files of these names are

@@ -35,15 +35,24 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
     out->settings = run->settings;
     run->frame.draw.renderer =
         GBT_RENDERER_TRACE; /* of a run trained with splats too: who measures chooses */
+    out->is_plain = is_plain;
     if (is_plain)
         run->frame.draw.footprint = 0; /* the Gaussians as the file has them */
     return GBT_OK;
 }
 
+static gbt_status trace_rays(void *context, trace_scene *built, const ray_image *rays, image *rgb,
+                             gbt_error *err)
+{
+    (void)context;
+    return trace_forward(built, rays, false, &(trace_outputs){.rgb = rgb}, NULL, err);
+}
+
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
-    GBT_TRY(frame_render_with(&s->run.frame, loaded_run_subject(&s->run), &s->camera.shot, &s->settings, NULL,
-                              err));
+    const frame_tracer whole = {.trace = trace_rays}; /* with one, nothing is left out */
+    GBT_TRY(frame_render_with(&s->run.frame, loaded_run_subject(&s->run), &s->camera.shot, &s->settings,
+                              s->is_plain ? &whole : NULL, err));
     s->gaussians = frame_drawn(&s->run.frame);
     return ray_image_from_shot(&s->camera.shot, 0, &s->rays, err);
 }

@@ -14,6 +14,7 @@ typedef struct bench_scene {
     ray_image rays;
     camera_file camera;
     loaded_run run;
+    bool is_plain; /* bench_scene_needs_camera() */
 } bench_scene;
 
 /**
@@ -26,7 +27,7 @@ typedef struct bench_scene {
  */
 gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *out, gbt_error *err);
 
-/** The Gaussians that can be seen with s->settings, and the rays. */
+/** The Gaussians, of a run those that can be seen with s->settings, and the rays. */
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err);
 
 void bench_scene_close(bench_scene *s);

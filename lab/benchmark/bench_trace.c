@@ -23,11 +23,12 @@ lab_bench_def lab_bench_def_default(void)
 /* What the caller has given in place of the model's own. */
 static gbt_status override_setting(const char *name, float given, float *setting, gbt_error *err)
 {
+    static const float least = 1e-30f; /* below it kernels round to 0 what counts */
     if (isnan(given) || given == 0)
         return GBT_OK;
-    if (!(given > 0 && given < 1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in (0, 1), got %g)", name,
-                         (double)given);
+    if (!(given >= least && given < 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bench: bad %s (wanted a number in [%g, 1), got %g)", name,
+                         (double)least, (double)given);
     *setting = given;
     return GBT_OK;
 }

@@ -66,7 +66,7 @@ static gbt_status measure_row(loaded_run *r, const model_sensitivity *s, double 
     model_steps steps = {0};
     model back = {0};
     *row = (rate_row){.quality = quality};
-    const bool coarse = quality > 0 && model_positions_fit(&r->model, s, quality); /* as gbt_compress() */
+    const bool coarse = quality > 0;
     gbt_status status = coarse ? model_steps_at(&r->model, s, quality, &steps, err) : GBT_OK;
     const double start = clock_wall();
     if (status == GBT_OK)
@@ -101,7 +101,12 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
     if (status == GBT_OK)
         status = model_turn_features(&r->model, &s, err);
     out->probe_seconds = clock_wall() - start;
+    int left_out = 0;
     for (size_t i = 0; i < sizeof ladder / sizeof *ladder && status == GBT_OK; i++) {
+        if (ladder[i] > 0 && !model_positions_fit(&r->model, &s, ladder[i])) { /* as gbt_compress() */
+            left_out++;
+            continue;
+        }
         rate_row *row = &out->rows[out->row_count];
         status = measure_row(r, &s, ladder[i], path, row, err);
         if (status == GBT_OK)
@@ -109,6 +114,10 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
                      row->sizes.total, row->psnr, out->psnr);
         out->row_count += status == GBT_OK;
     }
+    if (left_out > 0)
+        log_warn("%s: an anchor is so far from the others that their positions would be rounded too much: "
+                 "qualities left out: %d (sparse points far outside the scene?)",
+                 out->name, left_out);
     model_sensitivity_free(&s);
     return status;
 }

@@ -2,6 +2,7 @@
 /* command/import.c -- a trained Scaffold-GS model as a run. */
 #include "gbtrace/import.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -47,21 +48,24 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
                : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
 }
 
-/* A width in cfg_args divides photos by what only they can say. */
+/* A width in cfg_args, or images_N of open size, divides photos by what only they can say. */
 static gbt_status find_downscale(const result_folder *from, const char *data, double *out, gbt_error *err)
 {
     scene s;
     gbt_error why = {0};
-    *out = from->downscale;
-    if (from->width == 0)
+    *out = fmax(from->downscale, from->reduced);
+    if (from->width == 0 && from->reduced == 0)
         return GBT_OK;
     if (scene_load(data, NULL, &s, &why) != GBT_OK) {
-        log_warn(
-            "trained on photos %d pixels wide, and the data set cannot be read: tell eval the downscale (%s)",
-            from->width, why.text);
+        if (from->width > 0)
+            log_warn("trained on photos %d pixels wide, and the data set cannot be read: tell eval the "
+                     "downscale (%s)",
+                     from->width, why.text);
         return GBT_OK;
     }
-    const gbt_status status = photos_downscale_to(&s, from->width, out, err);
+    const gbt_status status = from->width > 0 ? photos_downscale_to(&s, from->width, out, err)
+                                              : photos_usual_downscale(&s, true, out, err);
+    *out = fmax(*out, from->reduced);
     scene_free(&s);
     return status;
 }

@@ -124,8 +124,8 @@ static void print_dataset(const char *path, const dataset_facts *f, FILE *out)
             fprintf(out, "\n            and %zu more", p->problem_count - PHOTO_CHECK_SHOWN);
         if (p->with_alpha + p->with_mask > 0)
             fprintf(out,
-                    "\n  masks     photos with a mask: %zu, with an alpha channel: %zu (on %s; see the "
-                    "setting alpha)",
+                    "\n  masks     photos with a mask: %zu, with an alpha channel: %zu (what is transparent "
+                    "lies on %s; see the setting alpha)",
                     p->with_mask, p->with_alpha, strcmp(s->source, "blender") == 0 ? "white" : "black");
         fprintf(out, "\n  extent    %g (of the training cameras)\n", f->extent);
     }

@@ -34,7 +34,8 @@ static void find_resolution(const char *text, result_folder *out)
     out->width = out->downscale == 0 && value > 0 && value <= 1 << 20 ? (int)value : 0;
 }
 
-/* images='images_N': photos that were divided by N before; a width stays as it is. */
+/* images='images_N': photos that were divided by N before, and then by what `resolution` says; a width stays
+   as it is. */
 static void find_reduced_photos(const char *text, result_folder *out)
 {
     static const char reduced[] = "images_";
@@ -43,8 +44,12 @@ static void find_reduced_photos(const char *text, result_folder *out)
     if (strncmp(name, reduced, strlen(reduced)) != 0 || out->width > 0)
         return;
     const long n = strtol(name + strlen(reduced), NULL, 10);
-    if (n >= 1 && n <= REDUCED_MAX)
-        out->downscale = (out->downscale > 0 ? out->downscale : 1) * (double)n;
+    if (n < 1 || n > REDUCED_MAX)
+        return;
+    if (out->downscale > 0)
+        out->downscale *= (double)n;
+    else
+        out->reduced = (int)n;
 }
 
 static gbt_status read_settings(const char *folder, result_folder *out, gbt_error *err)

@@ -19,6 +19,8 @@ typedef struct result_folder {
     double downscale;              /* cfg_args' resolution and images_N, of the data set's photos; 0: it does
                                       not say */
     int width;                     /* the same as the width that photos are brought to; 0: it is no width */
+    int reduced;                   /* N of images_N where `resolution` leaves the size open: photos are
+                                      divided by N, and wider ones to the usual width. Else 0 */
 } result_folder;
 
 /**

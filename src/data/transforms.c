@@ -42,7 +42,7 @@ static gbt_status find_file(const char *folder, const char *name, const char *co
 }
 
 /* The file that is `written`, or else the same with slashes for backslashes: here these are a letter like any
-   other. `name` is as it was found; `path` is of the last that was tried. */
+   other. `name` is as it was found, or else with slashes, and `path` of the last that was tried. */
 static gbt_status find_named(raw_place place, const char *what, const char *folder, const char *written,
                              const char *const *endings, char name[NAME_SIZE], char path[PATH_SIZE],
                              bool *found, gbt_error *err)
@@ -56,10 +56,8 @@ static gbt_status find_named(raw_place place, const char *what, const char *fold
         return GBT_OK;
     const char *slashed = with_slashes(name, other);
     GBT_TRY(raw_check_name(what, slashed, strlen(slashed), place, err));
-    GBT_TRY(find_file(folder, slashed, endings, path, found, err));
-    if (*found)
-        memcpy(name, slashed, strlen(slashed) + 1);
-    return GBT_OK;
+    memcpy(name, slashed, strlen(slashed) + 1);
+    return find_file(folder, name, endings, path, found, err);
 }
 
 static const char *const as_it_is[] = {"", NULL}, *const photo_endings[] = {"", ".png", ".jpg", NULL};

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/camera_model.h"
 #include "base/camera_pose.h"
 #include "base/compare.h"
 #include "base/fail.h"
@@ -197,15 +198,16 @@ typedef struct pose_curve {
     size_t *key;                 /* [count]: index of the camera; equal neighbours are left out */
     double (*point)[DIMENSIONS]; /* [count]: centre, 2 L q, L log zoom */
     double (*slope)[DIMENSIONS]; /* [count]: by the knot's parameter; of the pose */
-    double *gap;                 /* [count - 1]: from knot to knot */
+    double *gap;                 /* [count - 1]: from knot to knot of the pose; 0: it stays */
     size_t count;
     double turn_length;
 } pose_curve;
 
-static double distance_of(const double *a, const double *b)
+/** In the first `dimensions`: POSE or DIMENSIONS. */
+static double distance_of(const double *a, const double *b, int dimensions)
 {
     double sum = 0;
-    for (int k = 0; k < DIMENSIONS; k++)
+    for (int k = 0; k < dimensions; k++)
         sum += (a[k] - b[k]) * (a[k] - b[k]);
     return sqrt(sum);
 }
@@ -226,18 +228,25 @@ static void point_of(const gbt_camera *camera, double focal, double turn_length,
     out[ZOOM] = turn_length * log(camera->params[0] / focal);
 }
 
+/** From point i to the next, by the knot's parameter; 0 where the pose stays. */
+static double chord_of(const pose_curve *c, size_t i, int k)
+{
+    return c->gap[i] > 0 ? (c->point[i + 1][k] - c->point[i][k]) / c->gap[i] : 0;
+}
+
 /** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of
-    the chord at the ends. */
+    the chord at the ends; 0 beside a gap of 0, so that a camera which zooms in one place stays there. */
 static void find_slopes(pose_curve *c)
 {
     for (size_t i = 0; i < c->count; i++)
         for (int k = 0; k < POSE; k++) {
-            const double left = i > 0 ? (c->point[i][k] - c->point[i - 1][k]) / c->gap[i - 1] : 0;
-            const double right = i + 1 < c->count ? (c->point[i + 1][k] - c->point[i][k]) / c->gap[i] : left;
+            const double left = i > 0 ? chord_of(c, i - 1, k) : 0;
+            const double right = i + 1 < c->count ? chord_of(c, i, k) : left;
+            const double sum = i > 0 && i + 1 < c->count ? c->gap[i - 1] + c->gap[i] : 0;
             if (i == 0 || i + 1 == c->count)
                 c->slope[i][k] = i == 0 ? right : left;
             else
-                c->slope[i][k] = (left * c->gap[i] + right * c->gap[i - 1]) / (c->gap[i - 1] + c->gap[i]);
+                c->slope[i][k] = sum > 0 ? (left * c->gap[i] + right * c->gap[i - 1]) / sum : 0;
         }
 }
 
@@ -254,11 +263,11 @@ static gbt_status curve_make(const gbt_camera *keys, size_t count, double turn_l
     for (size_t i = 0; i < count; i++) {
         const size_t n = c->count;
         point_of(&keys[i], keys[0].params[0], turn_length, n > 0 ? c->point[n - 1] : NULL, c->point[n]);
-        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1]) : 0;
+        const double way = n > 0 ? distance_of(c->point[n], c->point[n - 1], DIMENSIONS) : 0;
         if (n > 0 && !(way > 1e-9 * turn_length))
             continue;
         if (n > 0)
-            c->gap[n - 1] = sqrt(way);
+            c->gap[n - 1] = sqrt(distance_of(c->point[n], c->point[n - 1], POSE));
         c->key[c->count++] = i;
     }
     find_slopes(c);
@@ -298,9 +307,11 @@ static void set_camera(const pose_curve *c, size_t segment, double u, gbt_camera
 {
     double at[DIMENSIONS], q[4];
     const gbt_camera *from = &c->keys[c->key[segment]], *to = &c->keys[c->key[segment + (c->count > 1)]];
+    const int focal_count = camera_focal_count(from->model);
     *out = *from;
     for (int k = 0; k < GBT_CAMERA_MAX_PARAMS; k++)
-        out->params[k] = (1 - u) * from->params[k] + u * to->params[k];
+        out->params[k] = k < focal_count ? from->params[k] * pow(to->params[k] / from->params[k], u)
+                                         : (1 - u) * from->params[k] + u * to->params[k];
     curve_at(c, segment, u, at);
     memcpy(out->center, at, sizeof out->center);
     for (int k = 0; k < 4; k++)
@@ -316,7 +327,7 @@ static void measure(const pose_curve *c, double *length)
     length[0] = 0;
     for (size_t i = 1; i <= (c->count - 1) * STEPS; i++) {
         curve_at(c, (i - 1) / STEPS, (double)((i - 1) % STEPS + 1) / STEPS, at);
-        length[i] = length[i - 1] + distance_of(before, at);
+        length[i] = length[i - 1] + distance_of(before, at, DIMENSIONS);
         memcpy(before, at, sizeof before);
     }
 }
@@ -363,7 +374,7 @@ static double way_between(const gbt_camera *a, const gbt_camera *b, double turn_
     double p[DIMENSIONS], q[DIMENSIONS];
     point_of(a, a->params[0], turn_length, NULL, p);
     point_of(b, b->params[0], turn_length, p, q);
-    return distance_of(p, q);
+    return distance_of(p, q, DIMENSIONS);
 }
 
 gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_length, gbt_error *err)

@@ -54,7 +54,8 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
  * the unit quaternion with the sign nearer to the one before; q is made unit again. Then frames at even steps
  * of sqrt(|dx|^2 + (L angle)^2 + (L log zoom)^2), L = turn_length: turning by an angle counts as much as
  * moving far enough to turn the view of something L away by it, zooming as much as going nearer to something
- * L away. The lens goes from key to key with the curve.
+ * L away. Focal lengths go from key to key with the curve, by even ratios, the rest of the lens evenly.
+ * Between keys of one pose the camera stays.
  *
  * @param keys        [in] [count], count >= 1, of one model and size
  * @param turn_length [in] L, > 0

@@ -35,6 +35,7 @@ static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *
     out->model.iterations = folder.iteration;
     out->def.downscale = folder.downscale;
     out->picture_width = folder.width;
+    out->reduced = folder.reduced;
     out->def.alpha = folder.white_background ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK;
     for (int c = 0; c < 3; c++)
         out->settings.background[c] = folder.white_background;
@@ -177,8 +178,10 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
         downscale = out->def.downscale;
     if (downscale <= 0 && out->picture_width > 0)
         GBT_TRY(photos_downscale_to(&out->scene, out->picture_width, &downscale, err));
-    if (downscale <= 0) /* Gaussians of others, whose file says nothing */
+    if (downscale <= 0) { /* Gaussians of others, whose file says nothing */
         GBT_TRY(photos_usual_downscale(&out->scene, true, &downscale, err));
+        downscale = fmax(downscale, out->reduced);
+    }
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
 

@@ -22,6 +22,7 @@ typedef struct loaded_run {
     gbt_train_def def; /* the settings it was trained with; strings point into `strings` */
     config_strings strings;
     int picture_width;     /* of a result folder that says so; then def.downscale is 0. Else 0 */
+    int reduced;           /* of a result folder (data/result_folder.h); then both are 0. Else 0 */
     run_data data;         /* where its data set is */
     scene scene;           /* cameras and points in the model's local coordinates */
     bool poses_refined;    /* the cameras are those of RUN/poses.json */

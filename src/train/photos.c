@@ -163,11 +163,13 @@ static size_t pixel_count(const photos *p, size_t view, int level)
     return (size_t)camera.width * (size_t)camera.height;
 }
 
-/* With its marks and how transparent it is. */
+/* With its marks and how transparent it is; at most, before it was read. */
 static size_t full_bytes(const photos *p, size_t view)
 {
     const scene_view *v = &p->source->views[view];
-    return (size_t)(3 + (v->mask_path != NULL) + v->has_alpha) * pixel_count(p, view, 0);
+    const int more = p->full[view] == NULL ? (v->mask_path != NULL) + v->has_alpha
+                                           : (p->full_valid[view] != NULL) + (p->through[view] != NULL);
+    return (size_t)(3 + more) * pixel_count(p, view, 0);
 }
 
 static void drop_full(photos *p, size_t view)
@@ -210,13 +212,12 @@ gbt_status photos_read_full(photos *p, size_t view, gbt_error *err)
 {
     if (p->full[view] != NULL)
         return GBT_OK;
-    const size_t more = full_bytes(p, view);
-    const bool stays = p->bytes + more <= p->bytes_max;
+    const bool stays = p->bytes + full_bytes(p, view) <= p->bytes_max;
     if (!stays)
         drop_kept_until_next(p);
     GBT_TRY(read_into(p, view, err));
     if (stays)
-        p->bytes += more;
+        p->bytes += full_bytes(p, view);
     else
         p->kept_until_next = view;
     return GBT_OK;

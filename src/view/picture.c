@@ -152,19 +152,32 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     return status;
 }
 
+/* Which pixels of a photo count, as in scores; `f` holds them. */
+static gbt_status find_marks(const studio *s, size_t view, frame *f, const unsigned char **marks,
+                             gbt_error *err)
+{
+    const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
+    const ray_shot shot = ray_shot_of(&camera);
+    GBT_TRY(ray_image_from_shot(&shot, 0, &f->rays, err));
+    return frame_valid(f, photos_valid(&s->run->photos, view), marks, err);
+}
+
 gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err)
 {
     gbt_camera camera;
     picture_times times = {0};
     image photo = {0};
+    frame lens = {0}; /* its rays alone */
+    const unsigned char *marks = NULL;
     GBT_TRY(studio_camera(s, what, &camera, err)); /* there is such a view */
     gbt_status status = photos_get(&s->run->photos, (size_t)what->view, 0, &photo, err);
+    if (status == GBT_OK && what->format == REQUEST_RAW)
+        status = find_marks(s, (size_t)what->view, &lens, &marks, err);
     if (status == GBT_OK)
         status = finish(s, &photo, what, &times, out, err);
-    image_free(&photo);
-    const unsigned char *marks = photos_valid(&s->run->photos, (size_t)what->view);
-    for (size_t i = 0; status == GBT_OK && what->format == REQUEST_RAW && marks != NULL && i < out->count / 4;
-         i++)
+    for (size_t i = 0; status == GBT_OK && marks != NULL && i < out->count / 4; i++)
         out->bytes[4 * i + 3] = marks[i] ? 255 : 0;
+    image_free(&photo);
+    frame_free(&lens);
     return status;
 }

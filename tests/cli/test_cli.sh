@@ -394,12 +394,16 @@ for name in forward_core_us_per_ray adjoint_core_us_per_ray nodes_per_ray candid
 done
 grep -q '"schema": 3' two.json && [ "$(grep -c '"kernel": "embree"' two.json)" = 1 ] && [ "$(grep -c '"kernel": "tree"' two.json)" = 2 ] && [ "$(grep -c '"psnr_to_reference": [0-9][0-9]' two.json)" = 3 ]
 report $? "bench names kernels and their errors" "$(cat two.json)"
+printf '{"origin": [0, 0, 0.5], "target": [0, 0, 2], "up": [0, 1, 0], "fov_x_deg": 40, "width": 40, "height": 32}' >inside.json
+"$program" bench trace --model gaussians.ply --camera inside.json --repeats 1 --json inside-bench.json >out 2>err && grep -q '"gaussians": 60,' inside-bench.json
+report $? "bench takes plain Gaussians behind the camera too" "$(cat err out)"
 prints "bench with a preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast
 prints "options of 0 leave it to the preset" '^alpha_min 0.02, alpha_max 0.99, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0 --alpha-max 0 --t-min 0
 prints "options win over the preset" '^alpha_min 0.05, alpha_max 0.9, T_min 0.001; medians of 1$' $bench --preset fast --alpha-min 0.05 --alpha-max 0.9
 misuse 2 '--kernel: "tree,tree" (wanted list, packet, tree, single, embree or splats, or some of them with commas between)' $bench --kernel tree,tree
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "bench: bad alpha_max (wanted alpha_min, 0.5, or more, got 0.4)" $bench --alpha-min 0.5 --alpha-max 0.4
+misuse 2 "bench: bad alpha_min (wanted a number in [1e-30, 1), got 1e-31)" $bench --alpha-min 1e-31
 misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
 mkdir alone && cp gaussians.ply alone && "$program" export gaussians.ply alone/gaussians.splat >out 2>err
 for study in speed crosscheck; do

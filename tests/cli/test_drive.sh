@@ -184,6 +184,9 @@ mkdir -p widths/point_cloud/iteration_7 && cp scaffold/point_cloud.ply scaffold/
 printf "Namespace(source_path='made', resolution=16)" >widths/cfg_args
 "$program" import widths -o at_width >out 2>err && [ ! -s err ] && "$program" info at_width | grep -q '^  config    downscale = 2$'
 report $? "a width in cfg_args divides the photos of the data set" "$(cat err out; "$program" info at_width)"
+printf "Namespace(source_path='made', images='images_4', resolution=-1)" >widths/cfg_args
+"$program" import widths -o at_quarter >out 2>err && "$program" info at_quarter | grep -q '^  config    downscale = 4$'
+report $? "and so does images_4" "$(cat err out; "$program" info at_quarter)"
 printf "Namespace(source_path='gone', resolution=16)" >widths/cfg_args
 "$program" import widths -o unknown_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
 report $? "without the data set it is told" "$(cat err out)"

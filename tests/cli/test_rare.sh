@@ -80,9 +80,12 @@ report $? "an export tells scores to photos where these have no exposures" "$(ca
 
 mkdir -p mine/scene && holds "the demo leaves data that are no scene of its own alone" 2 '^error: mine/scene: is there, and is no scene of ' demo -o mine && [ -z "$(ls mine/scene)" ]
 report $? "nor anything in their folder"
-mkdir -p shop/scene && : >shop/scene/sparse && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
-[ $? = 4 ] && rm shop/scene/sparse
-report $? "a scene that was not finished" "$(cat out)"
+mkdir -p shop/scene/sparse/0/images.bin && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
+[ $? = 4 ] && [ ! -e shop/scene/sparse/0/points3D.bin ] && rm -r shop/scene/sparse # bench/ looks for what is written last
+report $? "a scene that was not finished" "$(cat out; ls -R shop/scene)"
+mkdir -p rolled-part/points.ply && "$program" make-scene tabletop -o rolled-part --lens rolling --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
+[ $? = 4 ] && [ ! -e rolled-part/transforms.json ]
+report $? "nor one of moving cameras" "$(cat out; ls rolled-part)"
 cp -r listed shop/run && holds "the demo takes it for its own, and leaves a run of other data alone" 2 '^error: shop/run: holds a run already ' demo -o shop --minutes 0.05 && cmp listed/model.gbt shop/run/model.gbt >out
 report $? "and its model" "$(cat out)"
 sed -i '3s|.*|../scene|' shop/run/data_places && holds "the demo trains its own run anew" 0 '^Report: shop/run/report.html$' demo -o shop --minutes 0.05 && ! cmp -s listed/model.gbt shop/run/model.gbt
@@ -140,6 +143,10 @@ report $? "the scores in a result folder are those of its pictures" "$(cat score
     "$program" render plain.ply -o as-is --data wide -d 1 >>out 2>>err && ! "$program" compare usual/0000.png as-is/0000.png >>out 2>>err &&
     grep -q '1600 x 10' err && grep -q '1920 x 12' err
 report $? "wide photos of plain Gaussians" "$(cat err out)"
+"$program" make-scene tabletop -o wider --width 3600 --height 24 --views 3 --points 20 --samples 1 --quiet >out 2>err && "$program" render result -o at-most --data wider >>out 2>>err &&
+    sed -i 's/resolution=-1/resolution=1/' result/cfg_args && "$program" render result -o at-half --data wider >>out 2>>err && ! "$program" compare at-most/0000.png at-half/0000.png >>out 2>>err &&
+    grep -q '1600 x 11' err && grep -q '1800 x 12' err
+report $? "wide photos of a result folder that were divided before" "$(cat err out result/cfg_args)"
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
 mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,%s],[0,0,0,1]]}' "$1" "$2" "$3"; }

@@ -4,6 +4,7 @@
 #include <jansson.h>
 #include <unistd.h>
 
+#include "base/image.h"
 #include "data/json_out.h"
 #include "data/scene.h"
 #include "command/ball_mesh.h"
@@ -144,6 +145,33 @@ static void info_of_a_model(void **state)
     free(text);
     model_free(&m);
     unlink(in_folder("model.gbt"));
+}
+
+/* Headers alone are read: whether such a photo is opaque is not known. */
+static void info_of_photos_with_an_alpha_channel(void **state)
+{
+    (void)state;
+#define FRAME(name, x)                                                                                       \
+    "{\"file_path\": \"" name "\", \"transform_matrix\": [[1, 0, 0, " x "], [0, 1, 0, 0], [0, 0, 1, 0]]}"
+    static const char cameras[] =
+        "{\"fl_x\": 8, \"w\": 8, \"h\": 8, \"frames\": [" FRAME("0.png", "0") ", " FRAME("1.png", "1") "]}";
+    image photo;
+    assert_ok(image_alloc(&photo, 8, 8, 4, NULL));
+    for (int i = 0; i < 8 * 8 * 4; i++)
+        photo.pixels[i] = 1;
+    assert_ok(file_make_folder(in_folder("opaque"), NULL));
+    for (int i = 0; i < 2; i++)
+        assert_ok(image_write(in_folder("opaque/%d.png", i), &photo, NULL));
+    image_free(&photo);
+    write_text(in_folder("opaque/transforms.json"), cameras);
+    char *text = NULL;
+    size_t length = 0;
+    FILE *out = open_memstream(&text, &length);
+    assert_ok(gbt_info(in_folder("opaque"), 0, out, NULL));
+    fclose(out);
+    if (strstr(text, "alpha channel: 2 (what is transparent lies on black; see the setting alpha)\n") == NULL)
+        fail_msg("%s", text);
+    free(text);
 }
 
 static void info_writes_nothing_when_it_fails(void **state)
@@ -357,11 +385,17 @@ static void json_of_any_bytes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(info_of_a_cloud), cmocka_unit_test(expectations_hold),
-        cmocka_unit_test(info_of_a_model), cmocka_unit_test(info_writes_nothing_when_it_fails),
-        cmocka_unit_test(init_counts),     cmocka_unit_test(init_writes_world_coordinates),
-        cmocka_unit_test(init_refuses),    cmocka_unit_test(init_without_memory),
-        cmocka_unit_test(spheres),         cmocka_unit_test(json_of_any_bytes),
+        cmocka_unit_test(info_of_a_cloud),
+        cmocka_unit_test(expectations_hold),
+        cmocka_unit_test(info_of_a_model),
+        cmocka_unit_test(info_of_photos_with_an_alpha_channel),
+        cmocka_unit_test(info_writes_nothing_when_it_fails),
+        cmocka_unit_test(init_counts),
+        cmocka_unit_test(init_writes_world_coordinates),
+        cmocka_unit_test(init_refuses),
+        cmocka_unit_test(init_without_memory),
+        cmocka_unit_test(spheres),
+        cmocka_unit_test(json_of_any_bytes),
     };
     return cmocka_run_group_tests_name("info and init", tests, folder_make, folder_remove);
 }

@@ -88,12 +88,13 @@ static void newest_iteration(void **state)
                                               "images='images_4', resolution=2)",
                                               "images='images_4', resolution=1200)",
                                               "images='images_2024', resolution=-1)"};
-    static const double downscales[] = {4, 0, 0, 1, 0, 4, 8, 0, 0};
-    static const int widths[] = {0, 0, 1200, 0, 0, 0, 0, 1200, 0};
+    static const double downscales[] = {4, 0, 0, 1, 0, 0, 8, 0, 0};
+    static const int widths[] = {0, 0, 1200, 0, 0, 0, 0, 1200, 0}, reduced[] = {0, 0, 0, 0, 0, 4, 0, 0, 0};
     for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
         write_text(in_folder("cfg_args"), resolutions[i]);
         assert_ok(result_folder_find(test_folder, &found, &is_there, &assert_ok_err_));
-        assert_true(found.downscale == downscales[i] && found.width == widths[i]);
+        assert_true(found.downscale == downscales[i] && found.width == widths[i] &&
+                    found.reduced == reduced[i]);
     }
     assert_true(gaussian_file_readable(test_folder) && gaussian_file_has_gaussians(test_folder));
     gaussian_cloud cloud;

@@ -454,6 +454,16 @@ static void missing_photos_on_a_list(void **state)
         assert_int_equal(scene_load(test_folder, &by_list, &s, &err), GBT_ERR_FORMAT);
         assert_non_null(strstr(err.text, "list.txt:2: no image of the data set has this name"));
     }
+#define FRAME(name)                                                                                          \
+    "{\"file_path\": \"images\\\\" name "\", \"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}"
+    write_text(in_folder("windows/transforms.json"),
+               "{\"fl_x\": 10, \"frames\": [" FRAME("a.png") ", " FRAME("b.png") ", " FRAME("c.png") "]}");
+    write_picture(in_folder("windows/images/a.png"), 8, 6);
+    write_picture(in_folder("windows/images/b.png"), 8, 6);
+    write_text(list, "images/b.png\nimages/c.png\n");
+    assert_ok(scene_load(in_folder("windows"), &by_list, &s, &assert_ok_err_));
+    assert_true(s.view_count == 2 && !s.views[0].is_test && s.views[1].is_test);
+    scene_free(&s);
 }
 
 static void splits(void **state)

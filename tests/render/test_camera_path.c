@@ -442,11 +442,34 @@ static void zooming_on_the_spot(void **state)
     assert_ok(camera_path_through(keys, 3, 5, 9, &path, &assert_ok_err_));
     for (int i = 0; i < 9; i++) {
         const gbt_camera *c = &path.shots[i].camera;
-        assert_near(c->params[0], i < 4 ? 60 + 15 * i : 180 - 15 * i, 1e-6);
+        assert_near(c->params[0], 60 * exp2((i < 4 ? i : 8 - i) / 4.0), 1e-6); /* even ratios */
         assert_near(c->params[1], c->params[0], 0);
         assert_near(distance_between(c, &keys[0]), 0, 1e-12);
         assert_near(angle_between(c, &keys[0]), 0, 1e-6);
     }
+    camera_path_free(&path);
+}
+
+/** Along x, a zoom, along y: the moves around it do not carry the camera away while it zooms. */
+static void zooming_between_moves(void **state)
+{
+    (void)state;
+    const gbt_camera at = looking(0, 0, 0, (const double[3]){0, 0, 1});
+    gbt_camera keys[4] = {at, at, at, at};
+    keys[1].center[0] = keys[2].center[0] = keys[3].center[0] = keys[3].center[1] = 1;
+    keys[2].params[0] = keys[2].params[1] = keys[3].params[0] = keys[3].params[1] = 120;
+    camera_path path;
+    assert_ok(camera_path_through(keys, 4, 1, 101, &path, &assert_ok_err_));
+    int zooming = 0;
+    for (int i = 0; i < 101; i++) {
+        const gbt_camera *c = &path.shots[i].camera;
+        const bool zooms = c->params[0] > 60 + 1e-6 && c->params[0] < 120 - 1e-6;
+        zooming += zooms;
+        assert_near(c->center[0], zooms ? 1 : fmin(c->center[0], 1), 1e-9);
+        assert_near(c->center[1], c->params[0] < 120 - 1e-6 ? 0 : fmax(c->center[1], 0), 1e-9);
+        assert_near(c->center[1] * (1 - c->center[0]), 0, 1e-9);
+    }
+    assert_true(zooming > 20); /* of a way of 1 + log 2 + 1 */
     camera_path_free(&path);
 }
 
@@ -503,13 +526,13 @@ static void our_file(void **state)
     assert_int_equal(p.count, 5);
     for (int i = 0; i < 5; i++)
         assert_near(p.shots[i].camera.center[0], i, 1e-6);
-    assert_near(p.shots[2].camera.params[0], (32 + 32 / tan(PI / 6)) / 2, 1e-6);
+    assert_near(p.shots[2].camera.params[0], 32 / sqrt(tan(PI / 6)), 1e-6);
     camera_path_free(&p);
     p = read_good("{" COMMON ", \"origin\": [0, 0, 0], \"target\": [0, 0, 5], \"cameras\": [{}, "
                   "{\"fov_x_deg\": 60}]}",
                   none, 3); /* at one place */
     for (int i = 0; i < 3; i++)
-        assert_near(p.shots[i].camera.params[0], (32 * (2 - i) + 32 / tan(PI / 6) * i) / 2, 1e-6);
+        assert_near(p.shots[i].camera.params[0], 32 * pow(tan(PI / 6), -i / 2.0), 1e-6);
     camera_path_free(&p);
     p = read_good("{\"frames\": 5, " COMMON ", \"cameras\": " TWO "}", none, 3); /* the caller wins */
     assert_int_equal(p.count, 3);
@@ -777,6 +800,7 @@ int main(void)
         cmocka_unit_test(through_keys_far_away),
         cmocka_unit_test(turning_on_the_spot),
         cmocka_unit_test(zooming_on_the_spot),
+        cmocka_unit_test(zooming_between_moves),
         cmocka_unit_test(order_to_go_through),
         cmocka_unit_test(our_file),
         cmocka_unit_test(nerfstudio_file),

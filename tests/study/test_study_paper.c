@@ -7,6 +7,7 @@
 #include "data/json_fields.h"
 #include "eval/lpips.h"
 #include "eval/lpips_network.h"
+#include "io/model_file.h"
 #include "study/paper.h"
 #include "study/anchors.h"
 #include "study/time.h"
@@ -721,19 +722,19 @@ static json_t *study_of(const char *run, const char *name,
         fail_msg("%s: %s", run, err.text);
     fclose(out);
     assert_ok(json_read(in_folder("of-%s/%s.json", strrchr(run, '/') + 1, name), &whole, NULL));
-    json_t *model = json_incref(json_array_get(json_object_get(whole, "models"), 0));
+    json_t *studied = json_incref(json_array_get(json_object_get(whole, "models"), 0));
     json_decref(whole);
-    return model;
+    return studied;
 }
 
 /* What the study "speed" has for the preset "default" is what eval has. */
 static void check_photo_psnr(const char *run)
 {
-    json_t *model = study_of(run, "speed", lab_study_speed);
-    const json_t *row = json_array_get(json_object_get(model, "settings"), 1);
+    json_t *studied = study_of(run, "speed", lab_study_speed);
+    const json_t *row = json_array_get(json_object_get(studied, "settings"), 1);
     assert_string_equal(json_string_value(json_object_get(row, "value")), "default");
     assert_near(json_number_value(json_object_get(row, "photo_psnr")), metric_of(run, "psnr"), 0.01);
-    json_decref(model);
+    json_decref(studied);
 }
 
 /* Of the last held-out view of the run of halves, from now on with a mask that is black in its right quarter:
@@ -808,10 +809,10 @@ static void a_photo_masked_whole(void **state)
     assert_near(json_number_value(json_object_get(other, "lpips")), metric_of(run, "lpips"), 1e-12);
     json_decref(metrics);
 
-    json_t *model = study_of(run, "rate", lab_study_rate);
-    assert_int_equal(json_integer_value(json_object_get(model, "views")), 1);
-    assert_near(json_number_value(json_object_get(model, "psnr")), metric_of(run, "psnr"), 1e-6);
-    json_decref(model);
+    json_t *studied = study_of(run, "rate", lab_study_rate);
+    assert_int_equal(json_integer_value(json_object_get(studied, "views")), 1);
+    assert_near(json_number_value(json_object_get(studied, "psnr")), metric_of(run, "psnr"), 1e-6);
+    json_decref(studied);
 
     FILE *out = tmpfile();
     if (lab_check_grad(run, out, &err) != GBT_OK)
@@ -824,17 +825,46 @@ static void a_photo_masked_whole(void **state)
     check_lpips_of_a_half(&scores);
 }
 
+/* Small files of such a model are lossless, whatever quality was asked for: no row says another one. */
+static void an_anchor_far_from_the_others(void **state)
+{
+    (void)state;
+    const char *run = in_folder("stray");
+    gbt_train_def def = run_def();
+    def.iterations = 3;
+    train_ok(tiny, run, &def);
+    model m;
+    assert_ok(model_load(in_folder("stray/model.gbt"), &m, NULL));
+    m.anchors.position[0] += 1e6f * m.extent;
+    assert_ok(model_save(in_folder("stray/model.gbt"), &m, NULL));
+    model_free(&m);
+    json_t *studied = study_of(run, "rate", lab_study_rate);
+    const json_t *rows = json_object_get(studied, "settings");
+    assert_int_equal(json_array_size(rows), 1);
+    assert_true(json_is_null(json_object_get(json_array_get(rows, 0), "quality")));
+    json_decref(studied);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(mean_and_spread),        cmocka_unit_test(figures_as_text),
-        cmocka_unit_test(closed_form_of_balls),   cmocka_unit_test(constant_of_pairs),
-        cmocka_unit_test(what_the_paper_says),    cmocka_unit_test(verdicts),
-        cmocka_unit_test(names_and_folders),      cmocka_unit_test(when_a_curve_comes_there),
-        cmocka_unit_test(bad_requests),           cmocka_unit_test(the_papers_tables),
-        cmocka_unit_test(lpips_of_finished_runs), cmocka_unit_test(runs_are_made_once),
-        cmocka_unit_test(quality_against_time),   cmocka_unit_test(what_a_scene_needs),
-        cmocka_unit_test(data_named_in_latin_1),  cmocka_unit_test(a_photo_masked_whole),
+        cmocka_unit_test(mean_and_spread),
+        cmocka_unit_test(figures_as_text),
+        cmocka_unit_test(closed_form_of_balls),
+        cmocka_unit_test(constant_of_pairs),
+        cmocka_unit_test(what_the_paper_says),
+        cmocka_unit_test(verdicts),
+        cmocka_unit_test(names_and_folders),
+        cmocka_unit_test(when_a_curve_comes_there),
+        cmocka_unit_test(bad_requests),
+        cmocka_unit_test(the_papers_tables),
+        cmocka_unit_test(lpips_of_finished_runs),
+        cmocka_unit_test(runs_are_made_once),
+        cmocka_unit_test(quality_against_time),
+        cmocka_unit_test(what_a_scene_needs),
+        cmocka_unit_test(data_named_in_latin_1),
+        cmocka_unit_test(a_photo_masked_whole),
+        cmocka_unit_test(an_anchor_far_from_the_others),
     };
     return cmocka_run_group_tests(tests, make_root, folder_remove);
 }

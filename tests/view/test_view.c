@@ -6,10 +6,12 @@
 
 #include <fcntl.h>
 #include <jansson.h>
+#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 
 #include "base/image.h"
+#include "base/vec.h"
 #include "data/gaussian_file.h"
 #include "gbtrace/evaluate.h"
 #include "gbtrace/export.h"
@@ -413,7 +415,9 @@ static void masked_and_large_photos(void **state)
 #define POSE "\"transform_matrix\": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]"
     static const char text[] =
         "{\"fl_x\": 40, \"frames\": [{\"file_path\": \"0.png\", \"mask_path\": \"mask.png\", "
-        "\"w\": 48, \"h\": 36, " POSE "}, {\"file_path\": \"1.png\", \"w\": 1200, \"h\": 8000, " POSE "}]}";
+        "\"w\": 48, \"h\": 36, " POSE "}, {\"file_path\": \"1.png\", \"w\": 1200, \"h\": 8000, " POSE
+        "}, {\"file_path\": \"2.png\", \"camera_model\": \"OPENCV_FISHEYE\", \"fl_x\": 6, \"w\": 48, \"h\": "
+        "36, " POSE "}]}";
     image mask;
     assert_ok(image_alloc(&mask, 48, 36, 1, NULL));
     for (int i = 0; i < 48 * 36; i++)
@@ -421,7 +425,7 @@ static void masked_and_large_photos(void **state)
     assert_ok(file_make_folder(in_folder("beside"), NULL));
     assert_ok(image_write(in_folder("beside/mask.png"), &mask, NULL));
     image_free(&mask);
-    for (int i = 0; i < 2; i++)
+    for (int i = 0; i < 3; i++)
         copy_file(in_folder("tiny/images/0000.png"), in_folder("beside/%d.png", i));
     assert_ok(file_write_atomic(in_folder("beside/transforms.json"), text, sizeof text - 1, NULL));
     viewer v;
@@ -430,6 +434,12 @@ static void masked_and_large_photos(void **state)
     assert_int_equal(r.body_count, 4 * 48 * 36);
     for (int i = 0; i < 48 * 36; i++)
         assert_int_equal((unsigned char)r.body[4 * i + 3], i % 48 >= 16 ? 255 : 0);
+    free(r.text);
+    r = get_ok(port, "/photo?view=2"); /* rays up to 180 degrees off the axis */
+    assert_int_equal(r.body_count, 4 * 48 * 36);
+    for (int i = 0; i < 48 * 36; i++)
+        assert_int_equal((unsigned char)r.body[4 * i + 3],
+                         hypot(i % 48 - 23.5, i / 48 - 17.5) <= 6 * PI ? 255 : 0);
     free(r.text);
     static const char *const too_large[] = {"/render?view=1", "/pick?view=1&x=1&y=1"};
     for (int i = 0; i < 2; i++) {

@@ -22,6 +22,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <OpenImageIO/strutil.h>
+#include <zlib.h>
 
 extern "C" {
 #include "base/fail.h"
@@ -104,28 +105,6 @@ uint32_t big_endian(const unsigned char *p)
     return uint32_t(p[0]) << 24 | uint32_t(p[1]) << 16 | uint32_t(p[2]) << 8 | uint32_t(p[3]);
 }
 
-/* The CRC of the PNG specification, annex D. */
-uint32_t png_crc(const unsigned char *bytes, size_t count)
-{
-    struct crc_table {
-        uint32_t entry[256];
-        crc_table()
-        {
-            for (uint32_t i = 0; i < 256; i++) {
-                uint32_t c = i;
-                for (int bit = 0; bit < 8; bit++)
-                    c = (c & 1) != 0 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-                entry[i] = c;
-            }
-        }
-    };
-    static const crc_table table;
-    uint32_t crc = 0xFFFFFFFFu;
-    for (size_t i = 0; i < count; i++)
-        crc = table.entry[(crc ^ bytes[i]) & 0xFF] ^ (crc >> 8);
-    return crc ^ 0xFFFFFFFFu;
-}
-
 /* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be
    applied anyway. */
 gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt_error *err)
@@ -143,7 +122,7 @@ gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt
                              "%s@%zu: PNG is truncated (wanted a chunk of %zu bytes, got %zu)", path, read,
                              length, *count - read - 12);
         const unsigned char *type = bytes + read + 4;
-        const uint32_t wanted = big_endian(type + 4 + length), got = png_crc(type, length + 4);
+        const uint32_t wanted = big_endian(type + 4 + length), got = uint32_t(crc32_z(0, type, length + 4));
         if (wanted != got)
             return base_fail(err, GBT_ERR_FORMAT,
                              "%s@%zu: PNG chunk is damaged (wanted checksum %08x, got %08x)", path, read,

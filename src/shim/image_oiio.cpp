@@ -455,16 +455,16 @@ try {
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
 {
-    return read_file(path, out, err,
-                     [=](opened_image *o) { return read_pixels(path, o, out, nullptr, err); });
+    return image_read_valid(path, out, nullptr, err);
 }
 
 extern "C" gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err)
 {
-    *valid = nullptr;
+    if (valid != nullptr)
+        *valid = nullptr;
     const gbt_status status =
         read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, valid, err); });
-    if (status != GBT_OK) {
+    if (status != GBT_OK && valid != nullptr) {
         mem_free(*valid);
         *valid = nullptr;
     }
@@ -512,31 +512,18 @@ try {
     return caught(path, GBT_ERR_FORMAT, err);
 }
 
-extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,
-                                       gbt_error *err)
+extern "C" gbt_status image_encode(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
+                                   gbt_error *err)
 try {
     *bytes = nullptr;
     *byte_count = 0;
     gbt_status status = check_source(im, err);
-    std::vector<unsigned char> encoded;
-    if (status == GBT_OK)
-        status = encode_png(im, &encoded, err);
-    return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
-} catch (...) {
-    return caught("image", GBT_ERR_INTERNAL, err);
-}
-
-extern "C" gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes,
-                                        size_t *byte_count, gbt_error *err)
-try {
-    *bytes = nullptr;
-    *byte_count = 0;
-    gbt_status status = check_source(im, err);
-    if (status == GBT_OK && (quality < 1 || quality > 100))
+    if (status == GBT_OK && (quality < IMAGE_AS_PNG || quality > 100))
         status = base_fail(err, GBT_ERR_ARGUMENT, "image: JPEG quality %d (wanted 1 to 100)", quality);
     std::vector<unsigned char> encoded;
     if (status == GBT_OK)
-        status = encode_jpeg(im, quality, &encoded, err);
+        status =
+            quality == IMAGE_AS_PNG ? encode_png(im, &encoded, err) : encode_jpeg(im, quality, &encoded, err);
     return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
 } catch (...) {
     return caught("image", GBT_ERR_INTERNAL, err);

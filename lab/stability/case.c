@@ -44,7 +44,7 @@ static gbt_status check_list(const char *only, gbt_error *err)
         return GBT_OK;
     return base_fail(
         err, GBT_ERR_ARGUMENT,
-        "study stability: \"%.60s\" is not a list of different cases (wanted some of A1 to A18, as A1,A9)",
+        "study stability: \"%.60s\" is not a list of different cases (wanted some of A1 to A13, as A1,A9)",
         only);
 }
 

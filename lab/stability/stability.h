@@ -31,12 +31,7 @@ struct text; /* report/text.h */
     X(a10, "A10", "a10_wide_angle")                                                                          \
     X(a11, "A11", "a11_rolling_shutter")                                                                     \
     X(a12, "A12", "a12_extrapolation")                                                                       \
-    X(a13, "A13", "a13_poor_points")                                                                         \
-    X(a14, "A14", "a14_growth")                                                                              \
-    X(a15, "A15", "a15_balls")                                                                               \
-    X(a16, "A16", "a16_embree")                                                                              \
-    X(a17, "A17", "a17_ssim")                                                                                \
-    X(a18, "A18", "a18_same_bits")
+    X(a13, "A13", "a13_poor_points")
 
 enum {
     STABILITY_ROWS_MAX = 128,

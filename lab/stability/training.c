@@ -1,16 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* stability/training.c -- cases of the study "stability" about training: views far from the photos, poor
-   sparse points, the same bits. */
+   sparse points. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "anchor/decode_layout.h"
 #include "base/compare.h"
-#include "base/cpu.h"
-#include "base/hash.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
 #include "image/metrics.h"
@@ -360,67 +357,5 @@ gbt_status stability_a13(stability *s)
     if (s->status == GBT_OK)
         exposures_differ(s);
     stability_check(s, "A13", (double)bad, NAN, "Parameters and pictures of all of these runs.");
-    return s->status;
-}
-
-/* ---- A18: the same bits ---- */
-
-static uint64_t hash_of_run(stability *s, const practice *p, const gbt_train_def *def)
-{
-    uint64_t hash = HASH_START;
-    gbt_error why = {0};
-    trainer *t = mem_calloc(1, sizeof *t, "trainer", s->err);
-    if (t == NULL)
-        stability_ok(s, GBT_ERR_NO_MEMORY);
-    else if (s->status == GBT_OK && must(s, practice_open(s, p, def, t, &why), &why) &&
-             must(s, practice_steps(t, &why), &why)) {
-        const anchors *sets[] = {&t->anchors, &t->moment1.anchors, &t->moment2.anchors};
-        for (int i = 0; i < 3; i++)
-            for (int f = 0; f < ANCHOR_FIELDS; f++)
-                hash = hash_bytes(hash, sets[i]->field[f],
-                                  sets[i]->count * anchors_width(sets[i], f) * sizeof(float));
-        const float *networks[] = {t->decoder.params, t->moment1.networks, t->moment2.networks};
-        for (int i = 0; i < 3; i++)
-            hash = hash_bytes(hash, networks[i], t->decoder.param_count * sizeof(float));
-    }
-    if (t != NULL)
-        trainer_free(t);
-    mem_free(t);
-    return hash;
-}
-
-gbt_status stability_a18(stability *s)
-{
-    double threads[8];
-    const size_t thread_count = stability_list(s, "threads", 8, threads);
-    const int repeats = (int)stability_number(s, "repeats"), threads_before = parallel_threads();
-    const cpu_isa isa_before = cpu_best_isa();
-    practice *p = practice_make(s, 500, 9, 4, 360, (int)stability_number(s, "width"),
-                                (int)stability_number(s, "height"));
-    practice_write(s, p, "a18");
-    const gbt_train_def def = practice_def(s);
-    size_t by_threads = 0, by_isa = 0;
-    const uint64_t first = hash_of_run(s, p, &def);
-    for (size_t i = 0; i < thread_count; i++)
-        for (int k = 0; k < repeats && s->status == GBT_OK; k++) {
-            parallel_set_threads((int)threads[i]);
-            by_threads += hash_of_run(s, p, &def) != first;
-        }
-    parallel_set_threads(threads_before);
-    for (cpu_isa isa = CPU_PLAIN; isa < CPU_ISA_COUNT && s->status == GBT_OK; isa++) {
-        if (!cpu_has_isa(isa))
-            continue;
-        cpu_limit_isa(isa);
-        by_isa += hash_of_run(s, p, &def) != first;
-    }
-    cpu_limit_isa(isa_before);
-    stability_check(
-        s, "A18a", (double)by_threads, NAN,
-        "%zu numbers of threads, %d times each, %llu steps; anchors, networks and moments: %016llx.",
-        thread_count, repeats, (unsigned long long)def.iterations, (unsigned long long)first);
-    stability_check(s, "A18b", (double)by_isa, NAN, "Up to %s, which this machine has.",
-                    cpu_isa_name(isa_before));
-    practice_remove(p);
-    practice_free(p);
     return s->status;
 }

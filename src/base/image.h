@@ -47,8 +47,8 @@ gbt_status image_read(const char *path, image *out, gbt_error *err);
 /**
  * image_read(), and where it replaced values that are not finite by 0.
  *
- * @param valid [out] NULL when every value is finite, else [height][width]: 0 for pixels with a value that is
- *                    not; free with mem_free()
+ * @param valid [out] may be NULL; `*valid` is NULL when every value is finite, else [height][width]: 0 for
+ *                    pixels with a value that is not; free with mem_free()
  */
 gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err);
 
@@ -86,12 +86,12 @@ gbt_status image_lens_read(const char *path, image_lens *out, gbt_error *err);
  */
 gbt_status image_write(const char *path, const image *im, gbt_error *err);
 
-/** The PNG that image_write() would make, in memory (for the report). Free `*bytes` with mem_free(). */
-gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count, gbt_error *err);
+enum { IMAGE_AS_PNG = 0 };
 
-/** The same as JPEG at the given quality, [1, 100]. */
-gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
-                             gbt_error *err);
+/** A file in memory: a JPEG of that quality, [1, 100], or the PNG of image_write(). Free `*bytes` with
+    mem_free(). */
+gbt_status image_encode(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
+                        gbt_error *err);
 
 /** Name and version of the library behind these, as it runs: "OpenImageIO 2.4.7". Static. */
 const char *image_library(void);

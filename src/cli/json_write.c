@@ -33,7 +33,7 @@ void json_write_text(FILE *out, const char *text)
         else if (*s < 0x20 || *s == 0x7f)
             fprintf(out, "\\u%04x", *s);
         else if (length == 0)
-            fputc('?', out);
+            fputs("\\ufffd", out);
         else
             fwrite(s, 1, (size_t)length, out);
         s += length > 0 ? length : 1;

@@ -27,7 +27,7 @@ const char *progress_last_error(void);
 /** The last line with "json": how the program ends. */
 void progress_end(int exit_code);
 
-/** A JSON string with its quotes; bytes that are not UTF-8 become ?. */
+/** A JSON string with its quotes; bytes that are not UTF-8 become U+FFFD. */
 void json_write_text(FILE *out, const char *text);
 
 /** A JSON number; null when it is not finite. */

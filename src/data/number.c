@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/number.c -- numbers from and to text, the same in every locale. */
+/* data/number.c -- numbers from and to text. */
 #include "data/number.h"
 
-#include <locale.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -41,18 +40,13 @@ static number_result parse_named(const char *text, size_t length, bool negative,
     return NUMBER_OK;
 }
 
-/* The slow way, for long or extreme numbers; the grammar is already checked, the C locale makes the point a
-   point. */
+/* The slow way, for long or extreme numbers; the grammar is already checked. */
 static number_result parse_exactly(const char *text, size_t length, double *out)
 {
     char copy[TOKEN_LIMIT + 1];
     memcpy(copy, text, length);
     copy[length] = '\0';
-    const locale_t plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    if (plain == (locale_t)0)
-        return NUMBER_BAD;
-    *out = strtod_l(copy, NULL, plain);
-    freelocale(plain);
+    *out = strtod(copy, NULL);
     return isfinite(*out) ? NUMBER_OK : NUMBER_RANGE;
 }
 
@@ -134,21 +128,9 @@ number_result number_parse_u64(const char *text, size_t length, uint64_t *out)
 void number_format_double(double value, char out[NUMBER_TEXT_SIZE])
 {
     for (int digits = 15; digits <= 17; digits++) {
-        char text[NUMBER_TEXT_SIZE];
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        /* The host may have set a locale: whatever its decimal separator is (one byte or several), it becomes
-           one '.'. */
-        size_t used = 0;
-        bool in_separator = false;
-        for (const char *c = text; *c != '\0'; c++) {
-            const bool plain = is_digit(*c) || *c == '+' || *c == '-' || (*c >= 'a' && *c <= 'z');
-            if (plain || !in_separator)
-                out[used++] = plain ? *c : '.';
-            in_separator = !plain;
-        }
-        out[used] = '\0';
+        const int used = snprintf(out, NUMBER_TEXT_SIZE, "%.*g", digits, value);
         double back;
-        if (!isfinite(value) || (number_parse_double(out, used, &back) == NUMBER_OK && back == value))
+        if (!isfinite(value) || (number_parse_double(out, (size_t)used, &back) == NUMBER_OK && back == value))
             return;
     }
 }

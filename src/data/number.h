@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/number.h -- numbers from and to text, the same in every locale. */
+/* data/number.h -- numbers from and to text, in the C locale (base/plain_numbers.h). */
 #ifndef GBT_DATA_NUMBER_H
 #define GBT_DATA_NUMBER_H
 

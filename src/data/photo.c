@@ -47,8 +47,7 @@ static gbt_status is_premultiplied(const char *path, const image *stored, bool *
 /* Read a photo and look at its shape; `valid` is optional. */
 static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
 {
-    GBT_TRY(valid != NULL ? image_read_valid(view->path, stored, valid, err)
-                          : image_read(view->path, stored, err));
+    GBT_TRY(image_read_valid(view->path, stored, valid, err));
     if (photo_same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
         return valid != NULL ? mask_apply(view, stored, valid, err) : GBT_OK;
     return base_fail(

@@ -104,7 +104,7 @@ static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, i
     const int factor = shrink_factor(full->width, full->height, most);
     GBT_TRY(image_alloc(small, full->width / factor, full->height / factor, 3, err));
     shrink(full, factor, kind, small);
-    return image_encode_jpeg(small, JPEG_QUALITY, bytes, count, err);
+    return image_encode(small, JPEG_QUALITY, bytes, count, err);
 }
 
 gbt_status report_picture(text *out, const char *path, picture_kind kind, size_t most, int *width,
@@ -137,7 +137,7 @@ void report_image_png(text *out, const image *picture)
     unsigned char *bytes;
     size_t count;
     if (out->status == GBT_OK)
-        out->status = image_encode_png(picture, &bytes, &count, out->err);
+        out->status = image_encode(picture, IMAGE_AS_PNG, &bytes, &count, out->err);
     if (out->status == GBT_OK)
         add_uri(out, "png", bytes, count);
 }

@@ -22,6 +22,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <OpenImageIO/strutil.h>
+#include <zlib.h>
 
 extern "C" {
 #include "base/fail.h"
@@ -104,28 +105,6 @@ uint32_t big_endian(const unsigned char *p)
     return uint32_t(p[0]) << 24 | uint32_t(p[1]) << 16 | uint32_t(p[2]) << 8 | uint32_t(p[3]);
 }
 
-/* The CRC of the PNG specification, annex D. */
-uint32_t png_crc(const unsigned char *bytes, size_t count)
-{
-    struct crc_table {
-        uint32_t entry[256];
-        crc_table()
-        {
-            for (uint32_t i = 0; i < 256; i++) {
-                uint32_t c = i;
-                for (int bit = 0; bit < 8; bit++)
-                    c = (c & 1) != 0 ? 0xEDB88320u ^ (c >> 1) : c >> 1;
-                entry[i] = c;
-            }
-        }
-    };
-    static const crc_table table;
-    uint32_t crc = 0xFFFFFFFFu;
-    for (size_t i = 0; i < count; i++)
-        crc = table.entry[(crc ^ bytes[i]) & 0xFF] ^ (crc >> 8);
-    return crc ^ 0xFFFFFFFFu;
-}
-
 /* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be
    applied anyway. */
 gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt_error *err)
@@ -143,7 +122,7 @@ gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt
                              "%s@%zu: PNG is truncated (wanted a chunk of %zu bytes, got %zu)", path, read,
                              length, *count - read - 12);
         const unsigned char *type = bytes + read + 4;
-        const uint32_t wanted = big_endian(type + 4 + length), got = png_crc(type, length + 4);
+        const uint32_t wanted = big_endian(type + 4 + length), got = uint32_t(crc32_z(0, type, length + 4));
         if (wanted != got)
             return base_fail(err, GBT_ERR_FORMAT,
                              "%s@%zu: PNG chunk is damaged (wanted checksum %08x, got %08x)", path, read,
@@ -476,16 +455,16 @@ try {
 
 extern "C" gbt_status image_read(const char *path, image *out, gbt_error *err)
 {
-    return read_file(path, out, err,
-                     [=](opened_image *o) { return read_pixels(path, o, out, nullptr, err); });
+    return image_read_valid(path, out, nullptr, err);
 }
 
 extern "C" gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err)
 {
-    *valid = nullptr;
+    if (valid != nullptr)
+        *valid = nullptr;
     const gbt_status status =
         read_file(path, out, err, [=](opened_image *o) { return read_pixels(path, o, out, valid, err); });
-    if (status != GBT_OK) {
+    if (status != GBT_OK && valid != nullptr) {
         mem_free(*valid);
         *valid = nullptr;
     }
@@ -533,31 +512,18 @@ try {
     return caught(path, GBT_ERR_FORMAT, err);
 }
 
-extern "C" gbt_status image_encode_png(const image *im, unsigned char **bytes, size_t *byte_count,
-                                       gbt_error *err)
+extern "C" gbt_status image_encode(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
+                                   gbt_error *err)
 try {
     *bytes = nullptr;
     *byte_count = 0;
     gbt_status status = check_source(im, err);
-    std::vector<unsigned char> encoded;
-    if (status == GBT_OK)
-        status = encode_png(im, &encoded, err);
-    return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
-} catch (...) {
-    return caught("image", GBT_ERR_INTERNAL, err);
-}
-
-extern "C" gbt_status image_encode_jpeg(const image *im, int quality, unsigned char **bytes,
-                                        size_t *byte_count, gbt_error *err)
-try {
-    *bytes = nullptr;
-    *byte_count = 0;
-    gbt_status status = check_source(im, err);
-    if (status == GBT_OK && (quality < 1 || quality > 100))
+    if (status == GBT_OK && (quality < IMAGE_AS_PNG || quality > 100))
         status = base_fail(err, GBT_ERR_ARGUMENT, "image: JPEG quality %d (wanted 1 to 100)", quality);
     std::vector<unsigned char> encoded;
     if (status == GBT_OK)
-        status = encode_jpeg(im, quality, &encoded, err);
+        status =
+            quality == IMAGE_AS_PNG ? encode_png(im, &encoded, err) : encode_jpeg(im, quality, &encoded, err);
     return status != GBT_OK ? status : hand_over(encoded, bytes, byte_count, err);
 } catch (...) {
     return caught("image", GBT_ERR_INTERNAL, err);

@@ -258,7 +258,6 @@ static gbt_status read_arrays(trainer *t, const container *c, gbt_error *err)
     return GBT_OK;
 }
 
-/* Older checkpoints have none. */
 static gbt_status read_creation(trainer *t, const container *c, const char *path, gbt_error *err)
 {
     const size_t rows = t->anchors.count;
@@ -266,8 +265,7 @@ static gbt_status read_creation(trainer *t, const container *c, const char *path
     t->created = mem_calloc(rows, sizeof *t->created, "anchors", err);
     if (t->created == NULL)
         return GBT_ERR_NO_MEMORY;
-    if (container_section_named(c, "anchors.born") != NULL)
-        GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->created, err));
+    GBT_TRY(container_get(c, "anchors.born", CONTAINER_U64, rows, t->created, err));
     for (size_t i = 0; i < rows; i++)
         if (t->created[i] > t->anchor_t)
             return base_fail(err, GBT_ERR_FORMAT,
@@ -276,15 +274,12 @@ static gbt_status read_creation(trainer *t, const container *c, const char *path
     return GBT_OK;
 }
 
-/* Older checkpoints do not have each section. */
 static gbt_status check_data(const trainer *t, const container *c, const char *path, gbt_error *err)
 {
     uint64_t own[CHECKPOINT_DATA_HASHES], saved[CHECKPOINT_DATA_HASHES];
     checkpoint_hash_data(t, own);
-    memcpy(saved, own, sizeof saved);
     for (int i = 0; i < CHECKPOINT_DATA_HASHES; i++)
-        if (container_section_named(c, data_hashes[i].section) != NULL)
-            GBT_TRY(container_get(c, data_hashes[i].section, CONTAINER_U64, 1, &saved[i], err));
+        GBT_TRY(container_get(c, data_hashes[i].section, CONTAINER_U64, 1, &saved[i], err));
     const char *other = checkpoint_data_difference(own, saved);
     if (other != NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s: made from other data (%.1000s has %s)", path,
@@ -324,9 +319,8 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
     GBT_TRY(read_arrays(t, c, err));
     GBT_TRY(container_get(c, "pace", CONTAINER_U64, PACE_SEGMENTS, t->pace.steps, err));
     GBT_TRY(container_get(c, "seconds", CONTAINER_F64, 1, &t->seconds, err));
-    uint64_t in_row[3] = {0, 0, 0};
-    if (container_section_named(c, "in_row") != NULL) /* older checkpoints have none */
-        GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
+    uint64_t in_row[3];
+    GBT_TRY(container_get(c, "in_row", CONTAINER_U64, 3, in_row, err));
     t->skipped_in_row = in_row[0];
     t->empty_in_row = in_row[1];
     t->opacity_raises = in_row[2];

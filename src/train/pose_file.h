@@ -11,7 +11,7 @@
 gbt_status pose_file_write(const scene *s, bool held_out_aligned, const char *path, gbt_error *err);
 
 /** Give the views of `s` the poses that the file has for their names; others keep theirs.
-    `held_out_aligned` [out]: true, too, when an older file does not say it.
+    `held_out_aligned` [out]: true, too, when the file does not say it.
     GBT_ERR_IO, or GBT_ERR_FORMAT for what is no such file. */
 gbt_status pose_file_read(const char *path, scene *s, bool *held_out_aligned, gbt_error *err);
 

@@ -11,7 +11,7 @@
 enum { RUN_SPLIT_TEXT_SIZE = 8192 };
 
 /** `text`, a gbt_train_def.eval_split, with the run's own list in place of the one that it names; unchanged
-    where it names none, or where the run, made by an older version, has none. */
+    where it names none, or where the run has none. */
 gbt_status run_split_text(const char *run, const char *text, char out[RUN_SPLIT_TEXT_SIZE], gbt_error *err);
 
 /** Keep the list that split the scene; without one nothing is done. */

@@ -72,11 +72,12 @@ static gbt_status encode(const image *im, const request *what, answer *out, gbt_
                                         "application/octet-stream"};
     out->code = 200;
     out->type = types[what->format];
-    if (what->format == REQUEST_JPEG)
-        return image_encode_jpeg(im, what->quality, &out->bytes, &out->count, err);
-    if (what->format == REQUEST_PNG)
-        return image_encode_png(im, &out->bytes, &out->count, err);
-    return what->format == REQUEST_FLOAT ? encode_float(im, out, err) : encode_raw(im, out, err);
+    if (what->format == REQUEST_FLOAT)
+        return encode_float(im, out, err);
+    if (what->format == REQUEST_RAW)
+        return encode_raw(im, out, err);
+    const int quality = what->format == REQUEST_PNG ? IMAGE_AS_PNG : what->quality;
+    return image_encode(im, quality, &out->bytes, &out->count, err);
 }
 
 static gbt_status finish(const studio *s, const image *im, const request *what, picture_times *times,

@@ -13,6 +13,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/plain_numbers.h"
 #include "base/stop_signal.h"
 #include "data/number.h"
 #include "view/connections.h"
@@ -250,6 +251,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
                                   const char *method, const char *version, const char *body,
                                   size_t *body_bytes, void **state)
 {
+    PLAIN_NUMBERS; /* a thread begins with the program's locale */
     server *s = context;
     server_job *job = *state;
     const char *why;

@@ -489,6 +489,39 @@ static void memory_is_counted_and_limited(void **state)
     gaussians_free(&g);
 }
 
+/* Embree is refused memory at ever later points: each build is whole or an error, and nothing is kept. */
+static void builds_are_whole_or_refused(void **state)
+{
+    (void)state;
+    gaussians g = {0};
+    fill_cloud(&cloud_cases[0], 1, &g);
+    for (int is_tree = 0; is_tree < 2; is_tree++) {
+        const size_t before = bvh_memory_bytes();
+        int refused = 0;
+        for (size_t allowed = 256; allowed < 1u << 30; allowed += allowed / 4) {
+            gaussian_scene scene = {0};
+            gaussian_tree tree = {0};
+            gbt_error err = {0};
+            bvh_limit_memory(before + allowed);
+            const gbt_status status = is_tree
+                                          ? gaussian_tree_build(&g, alpha_min, INFINITY, 12, &tree, &err)
+                                          : gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, &err);
+            bvh_limit_memory(SIZE_MAX);
+            assert_int_equal(status == GBT_OK, is_tree ? tree.root != NULL : scene.box_count > 0);
+            gaussian_tree_free(&tree);
+            gaussian_scene_free(&scene);
+            assert_int_equal(bvh_memory_bytes(), before);
+            if (status == GBT_OK)
+                break;
+            assert_int_equal(status, GBT_ERR_NO_MEMORY);
+            assert_true(err.text[0] != '\0');
+            refused++;
+        }
+        assert_true(refused > 10);
+    }
+    gaussians_free(&g);
+}
+
 static void no_memory_is_an_error(void **state)
 {
     (void)state;
@@ -553,7 +586,7 @@ static void boxes_are_padded(void **state)
 int main(void)
 {
     enum { CASES = sizeof cloud_cases / sizeof *cloud_cases };
-    struct CMUnitTest tests[CASES + 8];
+    struct CMUnitTest tests[CASES + 9];
     for (size_t i = 0; i < CASES; i++)
         tests[i] = (struct CMUnitTest){.name = cloud_cases[i].name,
                                        .test_func = agrees_with_brute_force,
@@ -566,6 +599,7 @@ int main(void)
         cmocka_unit_test(bad_gaussians_are_counted),
         cmocka_unit_test(bad_rays_cross_nothing),
         cmocka_unit_test(memory_is_counted_and_limited),
+        cmocka_unit_test(builds_are_whole_or_refused),
         cmocka_unit_test(no_memory_is_an_error),
     };
     memcpy(tests + CASES, others, sizeof others);

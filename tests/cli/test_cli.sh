@@ -438,7 +438,7 @@ misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or cros
 misuse 2 "argument missing (usage: gbtrace study STUDY [MODEL|DATA...] -o DIR)" study -o study
 misuse 2 "study crosscheck: wanted a model, or data to train on" study crosscheck -o study
 misuse 2 'study stability: "gaussians.ply" is one too many' study stability gaussians.ply -o study
-misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A18, as A1,A9)' study stability --only A99 -o study
+misuse 2 'study stability: "A99" is not a list of different cases (wanted some of A1 to A13, as A1,A9)' study stability --only A99 -o study
 misuse 2 '--tables: "1,5" (wanted some of 1,2,3,4)' study paper made -o study --tables 1,5
 for study in speed crosscheck rate; do
     misuse 2 "study: a/r/E and b/r/E/ would have one name (wanted paths whose last two parts differ)" study $study a/r/E a/q/E b/r/E/ -o study

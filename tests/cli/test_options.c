@@ -423,14 +423,17 @@ static void environment(void **state)
 static void json_texts(void **state)
 {
     (void)state;
+#define BAD "\\ufffd"
     const struct {
         const char *text, *json;
     } rows[] = {{"", "\"\""},
                 {"a\"b\\c", "\"a\\\"b\\\\c\""},
                 {"\n\x01\x7f", "\"\\u000a\\u0001\\u007f\""},
                 {"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80", "\"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80\""},
-                {"\xff|\xc3|\xc0\x80|\xed\xa0\x80|\xe2\x82", "\"?|?|\?\?|\?\?\?|\?\?\""},
-                {"\xf4\x90\x80\x80", "\"\?\?\?\?\""}};
+                {"\xff|\xc3|\xc0\x80|\xed\xa0\x80|\xe2\x82",
+                 "\"" BAD "|" BAD "|" BAD BAD "|" BAD BAD BAD "|" BAD BAD "\""},
+                {"\xf4\x90\x80\x80", "\"" BAD BAD BAD BAD "\""}};
+#undef BAD
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         char *got = NULL;
         size_t size;

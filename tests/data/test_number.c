@@ -4,6 +4,7 @@
 
 #include <locale.h>
 
+#include "base/plain_numbers.h"
 #include "base/rng.h"
 #include "data/number.h"
 
@@ -160,6 +161,7 @@ static void any_locale(void **state)
         print_message("skipped: no locale with a decimal comma is installed\n");
         skip();
     }
+    PLAIN_NUMBERS;
     double value = 0;
     char text[NUMBER_TEXT_SIZE];
     const number_result result = number_parse_double("1.23456789012345678901234", 25, &value);

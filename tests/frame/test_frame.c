@@ -288,6 +288,20 @@ static void no_rays(void **state)
     free_world(&w);
 }
 
+static void a_model_without_anchors(void **state)
+{
+    (void)state;
+    world w = make_world(5);
+    const anchors none = {.offset_count = OFFSETS};
+    frame f = {0};
+    const ray_shot shot = random_shot(5, 0, NULL);
+    assert_ok(frame_render(&f, frame_neural(&none, &w.d), &shot.camera, &w.s, false, NULL));
+    for (size_t i = 0; i < 3 * W * H; i++)
+        assert_true(f.rgb.pixels[i] == w.s.background[i % 3]);
+    frame_free(&f);
+    free_world(&w);
+}
+
 /* Anchors of all sizes whose Gaussians end a little before or behind the edge of what is seen. */
 static void reaching_into_view(void **state)
 {
@@ -361,6 +375,7 @@ int main(void)
         cmocka_unit_test(a_tracer_of_the_caller),
         cmocka_unit_test(same_bits_for_every_thread_count),
         cmocka_unit_test(no_rays),
+        cmocka_unit_test(a_model_without_anchors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -337,8 +337,8 @@ static cloud shape_cloud(int shape, uint64_t seed)
     return c;
 }
 
-/* Every point once, depth bounded, statistics right and finite; leaves above N_min points only where nothing
-   separates them. */
+/* Every point once, depth bounded, statistics right and finite, the same for all threads; leaves above N_min
+   points only where nothing separates them. */
 static void shape_is_covered(void **state)
 {
     const int shape = *(const int *)*state;
@@ -352,6 +352,23 @@ static void shape_is_covered(void **state)
         assert_ok(balls_build(c.position, c.color, c.count, &def, &b, &assert_ok_err_));
         if (shape != HUGE_UNITS) /* whose variances leave the range of float */
             check_balls(&b, c.position, c.color, c.count, &def);
+        const int threads = parallel_threads();
+        const uint64_t bits = hash_balls(&b);
+        balls again;
+        parallel_set_threads(threads + 1);
+        assert_ok(balls_build(c.position, c.color, c.count, &def, &again, &assert_ok_err_));
+        parallel_set_threads(threads);
+        assert_true(hash_balls(&again) == bits);
+        balls_free(&again);
+        if (shape <= OUTLIER) { /* no two points in one place */
+            cloud shuffled;
+            uint32_t *to = cloud_shuffle(&c, seed, &shuffled);
+            assert_ok(balls_build(shuffled.position, shuffled.color, c.count, &def, &again, &assert_ok_err_));
+            check_same_partition(&b, &again, to);
+            balls_free(&again);
+            cloud_free(&shuffled);
+            free(to);
+        }
         for (size_t j = 0; j < b.count; j++) {
             assert_true(isfinite(b.radius[j]) && b.radius[j] > 0);
             for (int k = 0; k < 6; k++)

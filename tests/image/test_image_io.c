@@ -254,9 +254,9 @@ static void jpeg_round_trip_and_truncation(void **state)
         im.pixels[i] = (float)(i / 3 % 64) / 63.0f; /* smooth, grey */
     unsigned char *bytes;
     size_t count, rough_count;
-    assert_ok(image_encode_jpeg(&im, 10, &bytes, &rough_count, &assert_ok_err_));
+    assert_ok(image_encode(&im, 10, &bytes, &rough_count, &assert_ok_err_));
     mem_free(bytes);
-    assert_ok(image_encode_jpeg(&im, 95, &bytes, &count, &assert_ok_err_));
+    assert_ok(image_encode(&im, 95, &bytes, &count, &assert_ok_err_));
     assert_true(rough_count < count);
     assert_ok(file_write_atomic(in_folder("c.png"), bytes, count, &assert_ok_err_));
     assert_ok(image_read(in_folder("c.png"), &back, &assert_ok_err_));
@@ -272,13 +272,13 @@ static void jpeg_round_trip_and_truncation(void **state)
     }
     mem_free(bytes);
     gbt_error err = {0};
-    assert_int_equal(image_encode_jpeg(&im, 0, &bytes, &count, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(image_encode(&im, -1, &bytes, &count, &err), GBT_ERR_ARGUMENT);
     assert_null(bytes);
     err = (gbt_error){0};
-    assert_int_equal(image_encode_jpeg(&im, 101, &bytes, &count, &err), GBT_ERR_ARGUMENT);
+    assert_int_equal(image_encode(&im, 101, &bytes, &count, &err), GBT_ERR_ARGUMENT);
     image_free(&im);
     im = make_gradient(8, 8, 1);
-    assert_ok(image_encode_jpeg(&im, 100, &bytes, &count, &assert_ok_err_));
+    assert_ok(image_encode(&im, 100, &bytes, &count, &assert_ok_err_));
     assert_ok(file_write_atomic(in_folder("grey.jpg"), bytes, count, &assert_ok_err_));
     mem_free(bytes);
     assert_ok(image_read(in_folder("grey.jpg"), &back, &assert_ok_err_));
@@ -305,7 +305,7 @@ static void png_rounds_half_up_and_clamps(void **state)
             fail_msg("value %d became %g/255, not %d", i, (double)back.pixels[i] * 255, levels[i]);
     unsigned char *bytes, *file;
     size_t count, file_count;
-    assert_ok(image_encode_png(&im, &bytes, &count, &assert_ok_err_));
+    assert_ok(image_encode(&im, IMAGE_AS_PNG, &bytes, &count, &assert_ok_err_));
     assert_ok(file_read(in_folder("d.PNG"), &file, &file_count, &assert_ok_err_));
     assert_int_equal(count, file_count);
     assert_memory_equal(bytes, file, count);

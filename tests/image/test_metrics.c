@@ -174,6 +174,12 @@ static void ssim_equals_brute_force(void **state)
             assert_true(got > -1 && got < 1);
             assert_near(ssim_of(&b, &a), got, 1e-14);
             assert_true(ssim_of(&a, &a) == 1.0);
+            for (int k = 0; k < sizes[i][0] * sizes[i][1] * channels; k++) {
+                a.pixels[k] *= 255; /* bright, and b of other signs */
+                b.pixels[k] = a.pixels[k] - 500 * b.pixels[k];
+            }
+            assert_near(ssim_of(&a, &b), brute_ssim(&a, &b), 1e-9);
+            assert_true(ssim_of(&a, &a) == 1.0);
             image_free(&a);
             image_free(&b);
         }

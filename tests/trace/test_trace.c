@@ -1034,6 +1034,56 @@ static void broken_gaussians_are_left_out(void **state)
     gaussians_free(&g);
 }
 
+/* Spheres of about the step of floats there, a ray at each: none that the reference hits is lost. */
+static void small_spheres_far_away(void **state)
+{
+    (void)state;
+    enum { W = 32, RAYS = 16 * W };
+    static const trace_kernel kernels[] = {TRACE_TILE, TRACE_SINGLE, TRACE_EMBREE};
+    static const double places[][2] = {{0.005, 1e5}, {0.05, 1e6}, {0.005, 1e6}, {0.5, 1e7}}; /* size, where */
+    static float origin[3 * RAYS], dir[3 * RAYS], T[RAYS];
+    static double want_rgb[3 * RAYS], want[RAYS];
+    if (kernel == TRACE_LIST)
+        return; /* rays from many places have no lists */
+    const trace_settings s = trace_settings_default();
+    const ray_image rays = {.width = W, .height = RAYS / W, .origin = origin, .dir = dir};
+    gaussians g = some(RAYS, 1);
+    float *const mean[3] = {g.mean_x, g.mean_y, g.mean_z};
+    image rgb;
+    size_t hits = 0;
+    assert_ok(image_alloc(&rgb, rays.width, rays.height, 3, NULL));
+    for (size_t p = 0; p < sizeof places / sizeof *places; p++) {
+        const double size = places[p][0];
+        for (size_t i = 0; i < RAYS; i++) {
+            double way[3];
+            for (size_t k = 0; k < 3; k++)
+                way[k] = rng_normal(16 + p, k, i);
+            dvec_normalize(way);
+            for (size_t k = 0; k < 3; k++) {
+                mean[k][i] = (float)(places[p][1] + 1000 * size * (double)rng_uniform(16 + p, 3 + k, i));
+                origin[3 * i + k] = (float)((double)mean[k][i] - 5000 * size * way[k]);
+                dir[3 * i + k] = (float)way[k];
+            }
+            g.scale_x[i] = g.scale_y[i] = g.scale_z[i] = (float)(size / 3.3);
+        }
+        assert_ok(reference_forward(&g, &s, &rays, want_rgb, want, NULL, NULL));
+        for (size_t k = 0; k < sizeof kernels / sizeof *kernels; k++) {
+            trace_scene scene = {.kernel = kernels[k]};
+            assert_ok(trace_build(&scene, &g, &s, reach_of(&rays), NULL));
+            assert_ok(trace_forward(&scene, &rays, false, &(trace_outputs){.rgb = &rgb, .transmittance = T},
+                                    NULL, NULL));
+            for (size_t i = 0; i < RAYS; i++) {
+                assert_true(want[i] >= 0.97 || T[i] < 1);
+                hits += want[i] < 0.97;
+            }
+            trace_scene_free(&scene);
+        }
+    }
+    assert_true(hits > 1000);
+    image_free(&rgb);
+    gaussians_free(&g);
+}
+
 /* A disc thinner than float32 can square: the ray inside its plane hits it, its neighbours make infinities.
    No gradient may be NaN. */
 static void no_nan_from_neighbours(void **state)
@@ -1194,6 +1244,7 @@ int main(void)
         cmocka_unit_test(instruction_sets_and_threads_give_the_same_bits),
         cmocka_unit_test(rays_that_are_none),
         cmocka_unit_test(broken_gaussians_are_left_out),
+        cmocka_unit_test(small_spheres_far_away),
         cmocka_unit_test(no_nan_from_neighbours),
         cmocka_unit_test(wrong_sizes_are_refused),
         cmocka_unit_test(memory_runs_out),

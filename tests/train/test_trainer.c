@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/compare.h"
+#include "base/cpu.h"
 #include "base/image.h"
 #include "base/log.h"
 #include "base/paged.h"
@@ -286,6 +287,21 @@ static void threads_and_memory_do_not_change_bits(void **state)
         assert_same_file(straight_run(), in_folder("threads%d/model.gbt", threads));
     }
     gbt_set_threads(before);
+}
+
+static void instruction_sets_do_not_change_bits(void **state)
+{
+    (void)state;
+    const cpu_isa before = cpu_best_isa();
+    for (cpu_isa isa = CPU_PLAIN; isa < CPU_ISA_COUNT; isa++) {
+        if (!cpu_has_isa(isa))
+            continue;
+        const gbt_train_def def = run_def();
+        cpu_limit_isa(isa);
+        train_ok(tiny, in_folder("isa%d", (int)isa), &def);
+        cpu_limit_isa(before);
+        assert_same_file(straight_run(), in_folder("isa%d/model.gbt", (int)isa));
+    }
 }
 
 static void more_memory_than_allowed(void **state)
@@ -2219,6 +2235,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_signal_saves_and_ends),
         cmocka_unit_test(memory_for_hits_changes_no_bits),
         cmocka_unit_test(threads_and_memory_do_not_change_bits),
+        cmocka_unit_test(instruction_sets_do_not_change_bits),
         cmocka_unit_test(more_memory_than_allowed),
         cmocka_unit_test(another_seed_changes_bits),
         cmocka_unit_test(a_budget_run_can_be_repeated),

@@ -33,182 +33,237 @@ enum {
 
 static const float dome_radius = 95;
 
+static void look_at_paving(const surface *s, look *l)
+{
+    int id[2];
+    const float *p = s->position;
+    /* Rings of setts around the fountain; big slabs outside. */
+    const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
+    float edge, tone;
+    if (r < 8.0f) {
+        const float ring = floorf(r / 0.55f), around = ring * 6 + 8;
+        edge = texture_brick(angle / 6.2831853f * around, r / 0.55f, 1, 1, id);
+        tone = texture_hash(id[0], ((id[1] % (int)around) + (int)around) % (int)around, 4);
+        texture_mix(l->albedo, (const float[3]){0.50f, 0.44f, 0.38f}, (const float[3]){0.70f, 0.62f, 0.52f},
+                    tone);
+        if ((int)ring % 5 == 4)
+            set(l->albedo, 0.56f, 0.32f, 0.24f);
+        edge *= 0.55f;
+    } else {
+        edge = texture_brick(p[0], p[1], 1.5f, 1.0f, id);
+        tone = texture_hash(id[0], id[1], 5);
+        texture_mix(l->albedo, (const float[3]){0.54f, 0.52f, 0.48f}, (const float[3]){0.68f, 0.64f, 0.58f},
+                    tone);
+    }
+    texture_scale(l->albedo, 1 + 0.10f * texture_fbm(2 * p[0], 2 * p[1], 0, 3));
+    if (edge < 0.03f)
+        texture_scale(l->albedo, 0.62f);
+}
+
+static void look_at_grass(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.18f, 0.30f, 0.09f}, (const float[3]){0.36f, 0.46f, 0.16f},
+                0.5f + 0.6f * texture_fbm(1.6f * p[0], 1.6f * p[1], 0, 3));
+}
+
+static void look_at_stone(const surface *s, look *l)
+{
+    const float *p = s->position, u = s->uv[0];
+    set(l->albedo, 0.66f, 0.60f, 0.52f);
+    texture_scale(l->albedo, 0.92f + 0.22f * texture_fbm(3 * p[0], 3 * p[1], 3 * p[2], 3));
+    if (s->variant == 1 && ((int)floorf(16 * u) & 1) != 0)
+        texture_scale(l->albedo, 0.82f);
+}
+
+static void look_at_water(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const float ripple = 0.5f + 0.5f * sinf(9 * hypotf(p[0], p[1]) + 1.5f * texture_noise(p[0], p[1], 0));
+    texture_mix(l->albedo, (const float[3]){0.08f, 0.26f, 0.30f}, (const float[3]){0.16f, 0.38f, 0.40f},
+                ripple);
+    l->specular = 0.04f;
+    l->shininess = 60;
+    l->mirror = true;
+    l->roughness = 0.015f;
+}
+
+static void look_at_bronze(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.34f, 0.22f, 0.10f}, (const float[3]){0.20f, 0.42f, 0.34f},
+                texture_step(-0.1f, 0.4f, texture_fbm(4 * p[0], 4 * p[1], 4 * p[2], 3)));
+    l->specular = 0.16f;
+    l->shininess = 40;
+    l->mirror = true;
+    l->roughness = 0.05f;
+}
+
+static void look_at_facade(const surface *s, look *l)
+{
+    int id[2];
+    const float *p = s->position;
+    static const float paints[5][3] = {{0.78f, 0.58f, 0.36f},
+                                       {0.68f, 0.36f, 0.26f},
+                                       {0.80f, 0.74f, 0.58f},
+                                       {0.54f, 0.62f, 0.62f},
+                                       {0.76f, 0.50f, 0.42f}};
+    memcpy(l->albedo, paints[s->variant % 5], 3 * sizeof *l->albedo);
+    if (s->variant % 5 == 1 || p[2] < 0.9f) {
+        const float edge =
+            texture_brick(p[0] + p[1], p[2], p[2] < 0.9f ? 0.9f : 0.5f, p[2] < 0.9f ? 0.45f : 0.2f, id);
+        if (p[2] < 0.9f)
+            set(l->albedo, 0.56f, 0.52f, 0.46f);
+        texture_scale(l->albedo, edge < 0.025f ? 0.72f : 0.9f + 0.2f * texture_hash(id[0], id[1], 6));
+    }
+    texture_scale(l->albedo, 0.95f + 0.14f * texture_fbm(0.8f * p[0], 0.8f * p[1], 0.6f * p[2], 4));
+}
+
+static void look_at_pane(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    /* Glazing bars, and curtains behind some of the panes. */
+    const float curtain = texture_hash(s->variant, 3, 3);
+    texture_mix(l->albedo, (const float[3]){0.10f, 0.15f, 0.20f}, (const float[3]){0.30f, 0.40f, 0.48f},
+                texture_step(-0.7f, 0.9f, v));
+    if (curtain > 0.5f && fabsf(u) > 0.22f)
+        set(l->albedo, 0.66f, 0.60f, 0.52f);
+    if (fabsf(u) < 0.035f || fabsf(v - 0.25f) < 0.035f)
+        set(l->albedo, 0.78f, 0.76f, 0.70f);
+    l->specular = 0.05f;
+    l->shininess = 80;
+}
+
+static void look_at_door(const surface *s, look *l)
+{
+    const float u = s->uv[0];
+    const float board = u / 0.3f - floorf(u / 0.3f);
+    set(l->albedo, 0.22f, 0.30f, 0.26f);
+    if (s->variant % 2 == 1)
+        set(l->albedo, 0.40f, 0.18f, 0.12f);
+    if (board < 0.08f)
+        texture_scale(l->albedo, 0.6f);
+}
+
+static void look_at_trim(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.80f, 0.76f, 0.68f);
+}
+
+static void look_at_roof(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    const float wave = u / 0.5f - floorf(u / 0.5f), row = v / 0.42f - floorf(v / 0.42f);
+    texture_mix(l->albedo, (const float[3]){0.46f, 0.20f, 0.13f}, (const float[3]){0.64f, 0.32f, 0.20f},
+                texture_hash((int)floorf(u / 0.5f), (int)floorf(v / 0.42f), 8));
+    texture_scale(l->albedo, row < 0.15f || wave < 0.12f ? 0.7f : 1.0f);
+}
+
+static void look_at_bark(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.24f, 0.17f, 0.11f}, (const float[3]){0.40f, 0.30f, 0.20f},
+                0.5f + 0.5f * texture_fbm(9 * p[0], 9 * p[1], 2 * p[2], 2));
+}
+
+static void look_at_crown(const surface *s, look *l)
+{
+    const float *p = s->position;
+    static const float deep[3][3] = {{0.10f, 0.22f, 0.06f}, {0.14f, 0.26f, 0.06f}, {0.26f, 0.22f, 0.05f}};
+    static const float bright[3][3] = {{0.30f, 0.46f, 0.12f}, {0.42f, 0.50f, 0.14f}, {0.66f, 0.48f, 0.12f}};
+    texture_mix(l->albedo, deep[s->variant % 3], bright[s->variant % 3],
+                texture_step(-0.5f, 0.5f, texture_fbm(3.2f * p[0], 3.2f * p[1], 3.2f * p[2], 3)));
+}
+
+static void look_at_hedge(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.08f, 0.20f, 0.07f}, (const float[3]){0.24f, 0.38f, 0.12f},
+                texture_step(-0.5f, 0.5f, texture_fbm(5 * p[0], 5 * p[1], 5 * p[2], 3)));
+}
+
+static void look_at_iron(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.10f, 0.12f, 0.12f);
+    l->specular = 0.06f;
+    l->shininess = 25;
+}
+
+static void look_at_lamp_glass(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.90f, 0.84f, 0.66f);
+    l->specular = 0.05f;
+    l->shininess = 60;
+}
+
+static void look_at_bench(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    set(l->albedo, 0.46f, 0.28f, 0.14f);
+    texture_scale(l->albedo, 0.9f + 0.2f * texture_noise(2 * u, 12 * v, 0));
+}
+
+static void look_at_awning(const surface *s, look *l)
+{
+    const float u = s->uv[0];
+    const float stripe = u / 0.5f - floorf(u / 0.5f);
+    set(l->albedo, 0.84f, 0.80f, 0.72f);
+    if (stripe < 0.5f)
+        set(l->albedo, s->variant % 2 == 0 ? 0.66f : 0.14f, s->variant % 2 == 0 ? 0.16f : 0.36f,
+            s->variant % 2 == 0 ? 0.12f : 0.34f);
+}
+
+static void look_at_flowers(const surface *s, look *l)
+{
+    const float *p = s->position;
+    static const float petals[4][3] = {
+        {0.80f, 0.20f, 0.18f}, {0.88f, 0.70f, 0.18f}, {0.80f, 0.76f, 0.80f}, {0.52f, 0.26f, 0.58f}};
+    const float kind = texture_hash((int)floorf(3.2f * p[0]), (int)floorf(3.2f * p[1]), 2);
+    set(l->albedo, 0.16f, 0.30f, 0.10f);
+    if (texture_noise(5 * p[0], 5 * p[1], 5 * p[2]) > -0.05f)
+        memcpy(l->albedo, petals[(int)(4 * kind) & 3], 3 * sizeof *l->albedo);
+}
+
+static void look_at_hills(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const float patch = texture_fbm(0.10f * p[0], 0.10f * p[1], 0, 4),
+                far = texture_step(40, 95, hypotf(p[0], p[1]));
+    texture_mix(l->albedo, (const float[3]){0.16f, 0.28f, 0.10f}, (const float[3]){0.56f, 0.50f, 0.24f},
+                texture_step(-0.25f, 0.35f, patch));
+    /* Haze lightens what is far. */
+    texture_mix(l->albedo, l->albedo, (const float[3]){0.52f, 0.60f, 0.70f}, 0.55f * far);
+}
+
+static void look_at_sky(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const float height = p[2] / dome_radius;
+    float out[3];
+    texture_mix(out, (const float[3]){0.98f, 0.86f, 0.70f}, (const float[3]){0.34f, 0.56f, 0.92f},
+                texture_step(-0.10f, 0.55f, height));
+    const float cloud =
+        texture_step(0.02f, 0.45f, texture_fbm(0.045f * p[0], 0.045f * p[1], 0.11f * p[2], 4));
+    texture_mix(out, out, (const float[3]){1.05f, 1.0f, 0.95f}, 0.85f * cloud);
+    for (int k = 0; k < 3; k++)
+        l->emission[k] = 0.9f * out[k];
+}
+
 static void look_at_square(const surface *s, look *l)
 {
-    const float *p = s->position, u = s->uv[0], v = s->uv[1];
-    float *albedo = l->albedo;
-    int id[2];
-    switch (s->material) {
-    case PAVING: {
-        /* Rings of setts around the fountain; big slabs outside. */
-        const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
-        float edge, tone;
-        if (r < 8.0f) {
-            const float ring = floorf(r / 0.55f), around = ring * 6 + 8;
-            edge = texture_brick(angle / 6.2831853f * around, r / 0.55f, 1, 1, id);
-            tone = texture_hash(id[0], ((id[1] % (int)around) + (int)around) % (int)around, 4);
-            texture_mix(albedo, (const float[3]){0.50f, 0.44f, 0.38f}, (const float[3]){0.70f, 0.62f, 0.52f},
-                        tone);
-            if ((int)ring % 5 == 4)
-                set(albedo, 0.56f, 0.32f, 0.24f);
-            edge *= 0.55f;
-        } else {
-            edge = texture_brick(p[0], p[1], 1.5f, 1.0f, id);
-            tone = texture_hash(id[0], id[1], 5);
-            texture_mix(albedo, (const float[3]){0.54f, 0.52f, 0.48f}, (const float[3]){0.68f, 0.64f, 0.58f},
-                        tone);
-        }
-        texture_scale(albedo, 1 + 0.10f * texture_fbm(2 * p[0], 2 * p[1], 0, 3));
-        if (edge < 0.03f)
-            texture_scale(albedo, 0.62f);
-        break;
-    }
-    case GRASS:
-        texture_mix(albedo, (const float[3]){0.18f, 0.30f, 0.09f}, (const float[3]){0.36f, 0.46f, 0.16f},
-                    0.5f + 0.6f * texture_fbm(1.6f * p[0], 1.6f * p[1], 0, 3));
-        break;
-    case STONE:
-        set(albedo, 0.66f, 0.60f, 0.52f);
-        texture_scale(albedo, 0.92f + 0.22f * texture_fbm(3 * p[0], 3 * p[1], 3 * p[2], 3));
-        if (s->variant == 1 && ((int)floorf(16 * u) & 1) != 0)
-            texture_scale(albedo, 0.82f);
-        break;
-    case WATER: {
-        const float ripple = 0.5f + 0.5f * sinf(9 * hypotf(p[0], p[1]) + 1.5f * texture_noise(p[0], p[1], 0));
-        texture_mix(albedo, (const float[3]){0.08f, 0.26f, 0.30f}, (const float[3]){0.16f, 0.38f, 0.40f},
-                    ripple);
-        l->specular = 0.04f;
-        l->shininess = 60;
-        l->mirror = true;
-        l->roughness = 0.015f;
-        break;
-    }
-    case BRONZE:
-        texture_mix(albedo, (const float[3]){0.34f, 0.22f, 0.10f}, (const float[3]){0.20f, 0.42f, 0.34f},
-                    texture_step(-0.1f, 0.4f, texture_fbm(4 * p[0], 4 * p[1], 4 * p[2], 3)));
-        l->specular = 0.16f;
-        l->shininess = 40;
-        l->mirror = true;
-        l->roughness = 0.05f;
-        break;
-    case FACADE: {
-        static const float paints[5][3] = {{0.78f, 0.58f, 0.36f},
-                                           {0.68f, 0.36f, 0.26f},
-                                           {0.80f, 0.74f, 0.58f},
-                                           {0.54f, 0.62f, 0.62f},
-                                           {0.76f, 0.50f, 0.42f}};
-        memcpy(albedo, paints[s->variant % 5], 3 * sizeof *albedo);
-        if (s->variant % 5 == 1 || p[2] < 0.9f) {
-            const float edge =
-                texture_brick(p[0] + p[1], p[2], p[2] < 0.9f ? 0.9f : 0.5f, p[2] < 0.9f ? 0.45f : 0.2f, id);
-            if (p[2] < 0.9f)
-                set(albedo, 0.56f, 0.52f, 0.46f);
-            texture_scale(albedo, edge < 0.025f ? 0.72f : 0.9f + 0.2f * texture_hash(id[0], id[1], 6));
-        }
-        texture_scale(albedo, 0.95f + 0.14f * texture_fbm(0.8f * p[0], 0.8f * p[1], 0.6f * p[2], 4));
-        break;
-    }
-    case PANE: {
-        /* Glazing bars, and curtains behind some of the panes. */
-        const float curtain = texture_hash(s->variant, 3, 3);
-        texture_mix(albedo, (const float[3]){0.10f, 0.15f, 0.20f}, (const float[3]){0.30f, 0.40f, 0.48f},
-                    texture_step(-0.7f, 0.9f, v));
-        if (curtain > 0.5f && fabsf(u) > 0.22f)
-            set(albedo, 0.66f, 0.60f, 0.52f);
-        if (fabsf(u) < 0.035f || fabsf(v - 0.25f) < 0.035f)
-            set(albedo, 0.78f, 0.76f, 0.70f);
-        l->specular = 0.05f;
-        l->shininess = 80;
-        break;
-    }
-    case DOOR: {
-        const float board = u / 0.3f - floorf(u / 0.3f);
-        set(albedo, 0.22f, 0.30f, 0.26f);
-        if (s->variant % 2 == 1)
-            set(albedo, 0.40f, 0.18f, 0.12f);
-        if (board < 0.08f)
-            texture_scale(albedo, 0.6f);
-        break;
-    }
-    case TRIM:
-        set(albedo, 0.80f, 0.76f, 0.68f);
-        break;
-    case ROOF: {
-        const float wave = u / 0.5f - floorf(u / 0.5f), row = v / 0.42f - floorf(v / 0.42f);
-        texture_mix(albedo, (const float[3]){0.46f, 0.20f, 0.13f}, (const float[3]){0.64f, 0.32f, 0.20f},
-                    texture_hash((int)floorf(u / 0.5f), (int)floorf(v / 0.42f), 8));
-        texture_scale(albedo, row < 0.15f || wave < 0.12f ? 0.7f : 1.0f);
-        break;
-    }
-    case BARK:
-        texture_mix(albedo, (const float[3]){0.24f, 0.17f, 0.11f}, (const float[3]){0.40f, 0.30f, 0.20f},
-                    0.5f + 0.5f * texture_fbm(9 * p[0], 9 * p[1], 2 * p[2], 2));
-        break;
-    case CROWN: {
-        static const float deep[3][3] = {{0.10f, 0.22f, 0.06f}, {0.14f, 0.26f, 0.06f}, {0.26f, 0.22f, 0.05f}};
-        static const float bright[3][3] = {
-            {0.30f, 0.46f, 0.12f}, {0.42f, 0.50f, 0.14f}, {0.66f, 0.48f, 0.12f}};
-        texture_mix(albedo, deep[s->variant % 3], bright[s->variant % 3],
-                    texture_step(-0.5f, 0.5f, texture_fbm(3.2f * p[0], 3.2f * p[1], 3.2f * p[2], 3)));
-        break;
-    }
-    case HEDGE:
-        texture_mix(albedo, (const float[3]){0.08f, 0.20f, 0.07f}, (const float[3]){0.24f, 0.38f, 0.12f},
-                    texture_step(-0.5f, 0.5f, texture_fbm(5 * p[0], 5 * p[1], 5 * p[2], 3)));
-        break;
-    case IRON:
-        set(albedo, 0.10f, 0.12f, 0.12f);
-        l->specular = 0.06f;
-        l->shininess = 25;
-        break;
-    case LAMP_GLASS:
-        set(albedo, 0.90f, 0.84f, 0.66f);
-        l->specular = 0.05f;
-        l->shininess = 60;
-        break;
-    case BENCH:
-        set(albedo, 0.46f, 0.28f, 0.14f);
-        texture_scale(albedo, 0.9f + 0.2f * texture_noise(2 * u, 12 * v, 0));
-        break;
-    case AWNING: {
-        const float stripe = u / 0.5f - floorf(u / 0.5f);
-        set(albedo, 0.84f, 0.80f, 0.72f);
-        if (stripe < 0.5f)
-            set(albedo, s->variant % 2 == 0 ? 0.66f : 0.14f, s->variant % 2 == 0 ? 0.16f : 0.36f,
-                s->variant % 2 == 0 ? 0.12f : 0.34f);
-        break;
-    }
-    case FLOWERS: {
-        static const float petals[4][3] = {
-            {0.80f, 0.20f, 0.18f}, {0.88f, 0.70f, 0.18f}, {0.80f, 0.76f, 0.80f}, {0.52f, 0.26f, 0.58f}};
-        const float kind = texture_hash((int)floorf(3.2f * p[0]), (int)floorf(3.2f * p[1]), 2);
-        set(albedo, 0.16f, 0.30f, 0.10f);
-        if (texture_noise(5 * p[0], 5 * p[1], 5 * p[2]) > -0.05f)
-            memcpy(albedo, petals[(int)(4 * kind) & 3], 3 * sizeof *albedo);
-        break;
-    }
-    case HILLS: {
-        const float patch = texture_fbm(0.10f * p[0], 0.10f * p[1], 0, 4),
-                    far = texture_step(40, 95, hypotf(p[0], p[1]));
-        texture_mix(albedo, (const float[3]){0.16f, 0.28f, 0.10f}, (const float[3]){0.56f, 0.50f, 0.24f},
-                    texture_step(-0.25f, 0.35f, patch));
-        /* Haze lightens what is far. */
-        texture_mix(albedo, albedo, (const float[3]){0.52f, 0.60f, 0.70f}, 0.55f * far);
-        break;
-    }
-    default: { /* SKY */
-        const float height = p[2] / dome_radius;
-        float out[3];
-        texture_mix(out, (const float[3]){0.98f, 0.86f, 0.70f}, (const float[3]){0.34f, 0.56f, 0.92f},
-                    texture_step(-0.10f, 0.55f, height));
-        const float cloud =
-            texture_step(0.02f, 0.45f, texture_fbm(0.045f * p[0], 0.045f * p[1], 0.11f * p[2], 4));
-        texture_mix(out, out, (const float[3]){1.05f, 1.0f, 0.95f}, 0.85f * cloud);
-        for (int k = 0; k < 3; k++)
-            l->emission[k] = 0.9f * out[k];
-        break;
-    }
-    }
+    static look_fn *const looks[] = {
+        [PAVING] = look_at_paving, [GRASS] = look_at_grass,   [STONE] = look_at_stone,
+        [WATER] = look_at_water,   [BRONZE] = look_at_bronze, [FACADE] = look_at_facade,
+        [PANE] = look_at_pane,     [DOOR] = look_at_door,     [TRIM] = look_at_trim,
+        [ROOF] = look_at_roof,     [BARK] = look_at_bark,     [CROWN] = look_at_crown,
+        [HEDGE] = look_at_hedge,   [IRON] = look_at_iron,     [LAMP_GLASS] = look_at_lamp_glass,
+        [BENCH] = look_at_bench,   [AWNING] = look_at_awning, [FLOWERS] = look_at_flowers,
+        [HILLS] = look_at_hills,   [SKY] = look_at_sky,
+    };
+    looks[s->material](s, l);
 }
 
 /** A house front in the current frame: its wall stands at y = distance, from x0 to x1, and looks towards the

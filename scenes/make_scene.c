@@ -298,8 +298,17 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
         if (job.status[v] != GBT_OK)
             status = base_fail(err, job.status[v], "%s", job.errors[v].text);
     if (status == GBT_OK)
-        status = sparse_write(w, cameras, name_list, views, job.seeds, per_view, (size_t)def->points,
-                              def->point_noise, r->sight, def->seed, folder, err);
+        status = sparse_write(&(sparse_def){.w = w,
+                                            .cameras = cameras,
+                                            .names = name_list,
+                                            .view_count = views,
+                                            .seeds = job.seeds,
+                                            .per_view = per_view,
+                                            .wanted = (size_t)def->points,
+                                            .point_noise = def->point_noise,
+                                            .sight = r->sight,
+                                            .seed = def->seed},
+                              folder, err);
     if (status == GBT_OK && def->gaussians > 0) {
         char path[PATH_SIZE];
         status = file_join(path, sizeof path, folder, "gaussians.ply", err);

@@ -67,12 +67,7 @@ typedef struct track {
 } track;
 
 typedef struct search {
-    const world *w;
-    const gbt_camera *cameras;
-    size_t view_count, per_view, candidate_count;
-    const sparse_seed *seeds;
-    uint64_t seed;
-    float sight;         /* 0: no limit */
+    const sparse_def *def;
     size_t first;        /* of the candidates that this round looks at */
     track *tracks;       /* [ROUND] of this round, as all that follows */
     unsigned char *seen; /* [ROUND][view_count]: 1 where the view observes the candidate */
@@ -81,11 +76,11 @@ typedef struct search {
 /** Does a view see this point of a surface in frame, unhidden and not too flat? */
 static bool sees(const search *q, size_t view, const double point[3], const float normal[3])
 {
-    const gbt_camera *camera = q->cameras + view;
+    const gbt_camera *camera = q->def->cameras + view;
     double to_point[3], pixel[2];
     for (int k = 0; k < 3; k++)
         to_point[k] = point[k] - camera->center[k];
-    if (q->sight > 0 && dvec_length(to_point) > (double)q->sight)
+    if (q->def->sight > 0 && dvec_length(to_point) > (double)q->def->sight)
         return false;
     if (!gbt_camera_pixel(camera, point, pixel))
         return false;
@@ -102,7 +97,8 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
     }
     if (-(dir[0] * normal[0] + dir[1] * normal[1] + dir[2] * normal[2]) < least_cosine)
         return false;
-    return !mesh_tree_blocked(q->w->tree, origin, dir, (float)(distance * (1 - 1e-4)) - q->w->epsilon);
+    return !mesh_tree_blocked(q->def->w->tree, origin, dir,
+                              (float)(distance * (1 - 1e-4)) - q->def->w->epsilon);
 }
 
 static void find_tracks(size_t block, size_t begin, size_t end, void *context)
@@ -111,26 +107,26 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
     const search *q = context;
     for (size_t i = q->first + begin; i < q->first + end; i++) {
         /* Candidates go round the views, so that a prefix of the list covers all of them. */
-        const size_t view = i % q->view_count;
-        const sparse_seed *at = q->seeds + view * q->per_view + i / q->view_count;
+        const size_t view = i % q->def->view_count;
+        const sparse_seed *at = q->def->seeds + view * q->def->per_view + i / q->def->view_count;
         track *t = q->tracks + (i - q->first);
-        unsigned char *seen = q->seen + (i - q->first) * q->view_count;
+        unsigned char *seen = q->seen + (i - q->first) * q->def->view_count;
         memset(t, 0, sizeof *t);
-        memset(seen, 0, q->view_count);
+        memset(seen, 0, q->def->view_count);
         float origin[3], rgb[3];
         surface s;
-        if (!photo_ray(q->cameras + view, (double)at->px, (double)at->py, origin, t->dir) ||
-            !world_trace(q->w, origin, t->dir, &s))
+        if (!photo_ray(q->def->cameras + view, (double)at->px, (double)at->py, origin, t->dir) ||
+            !world_trace(q->def->w, origin, t->dir, &s))
             continue;
         static const float lamp_center[2] = {0, 0};
-        world_shade(q->w, &s, t->dir, lamp_center, rgb);
+        world_shade(q->def->w, &s, t->dir, lamp_center, rgb);
         for (int k = 0; k < 3; k++) {
             t->point[k] = (double)origin[k] + (double)s.distance * (double)t->dir[k];
             t->color[k] = (unsigned char)(255 * (rgb[k] > 1 ? 1 : rgb[k]) + 0.5f);
         }
         uint32_t count = 0;
-        for (size_t v = 0; v < q->view_count; v++) {
-            if (v != view && (double)rng_uniform(q->seed, STREAM_TRACK + v, i) >= keep_share)
+        for (size_t v = 0; v < q->def->view_count; v++) {
+            if (v != view && (double)rng_uniform(q->def->seed, STREAM_TRACK + v, i) >= keep_share)
                 continue;
             if (sees(q, v, t->point, s.geometric)) {
                 seen[v] = 1;
@@ -144,31 +140,31 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
 /** Where a view saw the true point: its projection and the detector's noise. */
 static void observe(const search *q, size_t candidate, size_t view, double pixel[2])
 {
-    gbt_camera_pixel(q->cameras + view, q->tracks[candidate - q->first].point, pixel);
+    gbt_camera_pixel(q->def->cameras + view, q->tracks[candidate - q->first].point, pixel);
     for (int k = 0; k < 2; k++)
         pixel[k] +=
-            observation_noise_px * rng_normal(q->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
+            observation_noise_px * rng_normal(q->def->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
 }
 
 /** The position that is written: the true one with noise, or an outlier. */
-static void disturb(const search *q, size_t candidate, size_t number, double point_noise, double out[3])
+static void disturb(const search *q, size_t candidate, size_t number, double out[3])
 {
     const track *t = q->tracks + (candidate - q->first);
-    const unsigned char *seen = q->seen + (candidate - q->first) * q->view_count;
+    const unsigned char *seen = q->seen + (candidate - q->first) * q->def->view_count;
     double nearest = INFINITY;
-    for (size_t v = 0; v < q->view_count; v++) {
+    for (size_t v = 0; v < q->def->view_count; v++) {
         double to_point[3];
         for (int k = 0; k < 3; k++)
-            to_point[k] = t->point[k] - q->cameras[v].center[k];
+            to_point[k] = t->point[k] - q->def->cameras[v].center[k];
         if (seen[v] != 0)
             nearest = fmin(nearest, dvec_length(to_point));
     }
     for (int k = 0; k < 3; k++)
-        out[k] = t->point[k] +
-                 point_noise * nearest * rng_normal(q->seed, STREAM_OUTLIER + 1 + (uint64_t)k, candidate);
+        out[k] = t->point[k] + q->def->point_noise * nearest *
+                                   rng_normal(q->def->seed, STREAM_OUTLIER + 1 + (uint64_t)k, candidate);
     if (number % OUTLIER_EVERY != OUTLIER_EVERY - 1)
         return;
-    const double part = 0.1 + 0.3 * (double)rng_uniform(q->seed, STREAM_OUTLIER, candidate);
+    const double part = 0.1 + 0.3 * (double)rng_uniform(q->def->seed, STREAM_OUTLIER, candidate);
     const double shift = (number / OUTLIER_EVERY % 2 == 0 ? -part : part) * nearest;
     for (int k = 0; k < 3; k++)
         out[k] += shift * (double)t->dir[k];
@@ -179,11 +175,11 @@ static double reprojection_error(const search *q, size_t candidate, const double
 {
     double sum = 0;
     int count = 0;
-    for (size_t v = 0; v < q->view_count; v++) {
+    for (size_t v = 0; v < q->def->view_count; v++) {
         double projected[2], observed[2];
-        if (q->seen[(candidate - q->first) * q->view_count + v] == 0)
+        if (q->seen[(candidate - q->first) * q->def->view_count + v] == 0)
             continue;
-        if (!gbt_camera_pixel(q->cameras + v, position, projected))
+        if (!gbt_camera_pixel(q->def->cameras + v, position, projected))
             continue;
         observe(q, candidate, v, observed);
         sum += dvec_length2(projected[0] - observed[0], projected[1] - observed[1]);
@@ -214,11 +210,10 @@ static void cloud_free(cloud *c, size_t view_count)
     memset(c, 0, sizeof *c);
 }
 
-/* The points of this round, up to `wanted` in all. */
-static gbt_status collect(const search *q, size_t count, size_t wanted, double point_noise, cloud *c,
-                          gbt_error *err)
+/* The points of this round, up to def->wanted in all. */
+static gbt_status collect(const search *q, size_t count, cloud *c, gbt_error *err)
 {
-    for (size_t i = q->first; i < q->first + count && c->point_count < wanted; i++) {
+    for (size_t i = q->first; i < q->first + count && c->point_count < q->def->wanted; i++) {
         const track *t = q->tracks + (i - q->first);
         if (t->count == 0)
             continue;
@@ -229,10 +224,10 @@ static gbt_status collect(const search *q, size_t count, size_t wanted, double p
         colmap_point *p = c->points + c->point_count;
         *p = (colmap_point){.track_count = t->count};
         memcpy(p->color, t->color, sizeof p->color);
-        disturb(q, i, c->point_count, point_noise, p->position);
+        disturb(q, i, c->point_count, p->position);
         p->error = reprojection_error(q, i, p->position);
-        for (size_t v = 0; v < q->view_count; v++) {
-            if (q->seen[(i - q->first) * q->view_count + v] == 0)
+        for (size_t v = 0; v < q->def->view_count; v++) {
+            if (q->seen[(i - q->first) * q->def->view_count + v] == 0)
                 continue;
             GBT_TRY(mem_reserve((void **)&c->observations[v], &c->observation_capacity[v],
                                 c->observation_count[v], c->observation_count[v] + 1,
@@ -260,21 +255,20 @@ static void refer_to_tracks(cloud *c)
     }
 }
 
-static gbt_status write_colmap(cloud *c, const gbt_camera *cameras, const char *const *names,
-                               size_t view_count, const char *folder, gbt_error *err)
+static gbt_status write_colmap(cloud *c, const sparse_def *def, const char *folder, gbt_error *err)
 {
     char path[4096];
     refer_to_tracks(c);
-    for (size_t v = 0; v < view_count; v++)
-        c->images[v] = (colmap_image){names[v], cameras[v], c->observation_count[v], c->observations[v]};
+    for (size_t v = 0; v < def->view_count; v++)
+        c->images[v] =
+            (colmap_image){def->names[v], def->cameras[v], c->observation_count[v], c->observations[v]};
     GBT_TRY(file_join(path, sizeof path, folder, "sparse/0", err));
     GBT_TRY(file_make_folder(path, err));
-    return colmap_write(path, c->images, view_count, c->points, c->point_count, err);
+    return colmap_write(path, c->images, def->view_count, c->points, c->point_count, err);
 }
 
 /* Cameras that move while they are read out, which no COLMAP model holds. */
-static gbt_status write_transforms(const cloud *c, const gbt_camera *cameras, const char *const *names,
-                                   size_t view_count, const char *folder, gbt_error *err)
+static gbt_status write_transforms(const cloud *c, const sparse_def *def, const char *folder, gbt_error *err)
 {
     char path[4096];
     float *position = mem_alloc(c->point_count, 3 * sizeof *position, "sparse points", err),
@@ -294,23 +288,15 @@ static gbt_status write_transforms(const cloud *c, const gbt_camera *cameras, co
     mem_free(color);
     GBT_TRY(status);
     GBT_TRY(file_join(path, sizeof path, folder, "transforms.json", err));
-    return transforms_write(path, names, cameras, view_count, "points.ply", err);
+    return transforms_write(path, def->names, def->cameras, def->view_count, "points.ply", err);
 }
 
-gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
-                        size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
-                        double point_noise, float sight, uint64_t seed, const char *folder, gbt_error *err)
+gbt_status sparse_write(const sparse_def *def, const char *folder, gbt_error *err)
 {
     gbt_status status = GBT_ERR_NO_MEMORY;
     cloud c = {0};
-    search q = {.w = w,
-                .cameras = cameras,
-                .view_count = view_count,
-                .per_view = per_view,
-                .candidate_count = view_count * per_view,
-                .seeds = seeds,
-                .seed = seed,
-                .sight = sight};
+    search q = {.def = def};
+    const size_t view_count = def->view_count, candidate_count = view_count * def->per_view;
     q.tracks = mem_alloc(ROUND, sizeof *q.tracks, "sparse candidates", err);
     q.seen = mem_alloc(ROUND, view_count, "sparse visibility", err);
     c.observations = mem_calloc(view_count, sizeof *c.observations, "sparse observations", err);
@@ -322,16 +308,16 @@ gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *c
         c.observation_capacity == NULL || c.images == NULL)
         goto done;
     status = GBT_OK;
-    while (status == GBT_OK && c.point_count < wanted && q.first < q.candidate_count) {
-        const size_t left = q.candidate_count - q.first, round = left < ROUND ? left : ROUND;
+    while (status == GBT_OK && c.point_count < def->wanted && q.first < candidate_count) {
+        const size_t left = candidate_count - q.first, round = left < ROUND ? left : ROUND;
         parallel_blocks(round, 64, find_tracks, &q);
-        status = collect(&q, round, wanted, point_noise, &c, err);
+        status = collect(&q, round, &c, err);
         q.first += round;
     }
     if (status != GBT_OK)
         goto done;
-    status = camera_is_still(&cameras[0]) ? write_colmap(&c, cameras, names, view_count, folder, err)
-                                          : write_transforms(&c, cameras, names, view_count, folder, err);
+    status = camera_is_still(&def->cameras[0]) ? write_colmap(&c, def, folder, err)
+                                               : write_transforms(&c, def, folder, err);
 done:
     cloud_free(&c, view_count);
     mem_free(q.tracks);

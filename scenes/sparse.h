@@ -23,18 +23,25 @@ typedef struct sparse_seed {
  */
 void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t wanted, sparse_seed *out);
 
+typedef struct sparse_def {
+    const world *w;
+    const gbt_camera *cameras; /* [view_count] */
+    const char *const *names;  /* [view_count]: of the photos' files */
+    size_t view_count;
+    const sparse_seed *seeds; /* [view_count][per_view] */
+    size_t per_view;
+    size_t wanted;      /* points, at most */
+    double point_noise; /* of positions, a share of the distance to the nearest view, per axis */
+    float sight;        /* a view finds no point that is farther; 0: no limit */
+    uint64_t seed;
+} sparse_def;
+
 /**
  * Follow the chosen points to the surfaces, find the views that see them, and write folder/sparse/0; for
  * cameras that move while they are read out folder/transforms.json and points.ply.
  *
- * @param seeds [view_count][per_view]
- * @param names [view_count]
- * @param sight a view finds no point that is farther; 0: no limit
- *
  * Memory: the points and their observations, some 100 bytes and 32 for each view of a point.
  */
-gbt_status sparse_write(const world *w, const gbt_camera *cameras, const char *const *names,
-                        size_t view_count, const sparse_seed *seeds, size_t per_view, size_t wanted,
-                        double point_noise, float sight, uint64_t seed, const char *folder, gbt_error *err);
+gbt_status sparse_write(const sparse_def *def, const char *folder, gbt_error *err);
 
 #endif

@@ -61,263 +61,338 @@ static void paint_picture(float u, float v, int variant, float out[3])
     }
 }
 
-static void look_at_room(const surface *s, look *l)
+static void look_at_floor(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const int i = (int)floorf(p[0] / 0.45f), j = (int)floorf(p[1] / 0.45f);
+    const float in_x = p[0] / 0.45f - (float)i, in_y = p[1] / 0.45f - (float)j;
+    const float shade = 0.85f + 0.2f * texture_hash(i, j, 3) + 0.10f * texture_fbm(5 * p[0], 5 * p[1], 0, 2);
+    if (((i + j) & 1) != 0)
+        set(l->albedo, 0.62f, 0.30f, 0.18f);
+    else
+        set(l->albedo, 0.74f, 0.66f, 0.52f);
+    texture_scale(l->albedo, shade);
+    if (fminf(fminf(in_x, 1 - in_x), fminf(in_y, 1 - in_y)) < 0.025f)
+        set(l->albedo, 0.36f, 0.32f, 0.28f);
+    l->specular = 0.03f;
+    l->shininess = 60;
+}
+
+static void look_at_rug(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
+    const float wave = r + 0.035f * sinf(12 * angle);
+    if (wave < 0.42f)
+        set(l->albedo, 0.78f, 0.68f, 0.46f);
+    else if (wave < 0.75f)
+        set(l->albedo, 0.16f, 0.26f, 0.42f);
+    else if (wave < 0.95f)
+        set(l->albedo, 0.80f, 0.72f, 0.52f);
+    else if (wave < 1.12f)
+        set(l->albedo, 0.62f, 0.18f, 0.14f);
+    else
+        set(l->albedo, 0.14f, 0.22f, 0.36f);
+    texture_scale(l->albedo, 1 + 0.16f * texture_noise(40 * p[0], 40 * p[1], 0));
+}
+
+static void look_at_brick_wall(const surface *s, look *l)
+{
+    int id[2];
+    const float *p = s->position, u = s->uv[0];
+    const float edge = texture_brick(u, p[2], 0.34f, 0.125f, id);
+    if (edge < 0.009f)
+        set(l->albedo, 0.66f, 0.62f, 0.56f);
+    else {
+        texture_mix(l->albedo, (const float[3]){0.50f, 0.20f, 0.13f}, (const float[3]){0.68f, 0.36f, 0.24f},
+                    texture_hash(id[0], id[1], 7));
+        texture_scale(l->albedo, 1 + 0.14f * texture_fbm(9 * u, 14 * p[2], 2, 2));
+    }
+}
+
+static void look_at_paper_wall(const surface *s, look *l)
+{
+    const float *p = s->position, u = s->uv[0];
+    /* Wide stripes with a diamond on every dark one. */
+    const float stripe = u / 0.30f - floorf(u / 0.30f);
+    set(l->albedo, 0.60f, 0.68f, 0.58f);
+    if (stripe < 0.5f) {
+        set(l->albedo, 0.42f, 0.55f, 0.46f);
+        const float height = p[2] / 0.30f - floorf(p[2] / 0.30f);
+        if (fabsf(stripe - 0.25f) * 2 + fabsf(height - 0.5f) < 0.28f)
+            set(l->albedo, 0.84f, 0.78f, 0.54f);
+    }
+    texture_scale(l->albedo, 1 + 0.04f * texture_fbm(3 * u, 3 * p[2], 4, 2));
+}
+
+static void look_at_plaster_wall(const surface *s, look *l)
+{
+    const float *p = s->position;
+    set(l->albedo, 0.80f, 0.68f, 0.50f);
+    texture_scale(l->albedo, 0.95f + 0.12f * texture_fbm(1.6f * p[0], 1.6f * p[1], 1.6f * p[2], 4));
+}
+
+static void look_at_panel_wall(const surface *s, look *l)
+{
+    const float *p = s->position, u = s->uv[0];
+    const float board = u / 0.24f - floorf(u / 0.24f);
+    const int number = (int)floorf(u / 0.24f);
+    const float ring = texture_wood(0.7f * p[2] + 7 * texture_hash(number, 0, 1), board * 0.4f + 0.3f,
+                                    0.2f + 0.3f * texture_hash(number, 1, 1));
+    texture_mix(l->albedo, (const float[3]){0.34f, 0.42f, 0.50f}, (const float[3]){0.44f, 0.53f, 0.60f},
+                ring);
+    if (board < 0.05f)
+        texture_scale(l->albedo, 0.45f);
+}
+
+static void look_at_wood(const surface *s, look *l)
+{
+    const float *p = s->position;
+    const float plank = floorf(p[1] / 0.18f), offset = texture_hash((int)plank, 5, s->material);
+    const float ring =
+        texture_wood(1.1f * p[0] + 5 * offset, 1.6f * (p[1] - 0.18f * plank) + 0.25f + 0.2f * offset,
+                     0.5f * p[2] + 0.3f * offset);
+    texture_mix(l->albedo, (const float[3]){0.33f, 0.18f, 0.09f}, (const float[3]){0.60f, 0.37f, 0.19f},
+                ring);
+    if (s->material == TABLE_TOP) {
+        texture_scale(l->albedo, 0.85f + 0.3f * offset);
+        if (p[1] / 0.18f - plank < 0.025f && s->normal[2] > 0.5f)
+            texture_scale(l->albedo, 0.5f);
+    }
+    l->specular = 0.03f;
+    l->shininess = 40;
+}
+
+static void look_at_picture(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    paint_picture(u / 0.36f, v / 0.27f, s->variant, l->albedo);
+}
+
+static void look_at_window(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    /* A painted view; it gives light of its own, as daylight behind a pane would. */
+    float out[3];
+    texture_mix(out, (const float[3]){0.95f, 0.90f, 0.80f}, (const float[3]){0.42f, 0.66f, 0.95f},
+                texture_step(-0.3f, 0.6f, v));
+    const float cloud = texture_step(0.05f, 0.5f, texture_fbm(2.2f * u, 3.6f * v, 1, 3));
+    texture_mix(out, out, (const float[3]){1, 1, 1}, 0.8f * cloud);
+    if (v < -0.28f + 0.10f * texture_noise(2.1f * u, 0, 7))
+        set(out, 0.30f, 0.48f, 0.34f);
+    if (v < -0.40f + 0.08f * texture_noise(3.3f * u, 2, 3))
+        set(out, 0.20f, 0.36f, 0.16f);
+    for (int k = 0; k < 3; k++)
+        l->emission[k] = 0.8f * out[k];
+    set(l->albedo, 0.05f, 0.05f, 0.05f);
+}
+
+static void look_at_book(const surface *s, look *l)
+{
+    const float v = s->uv[1];
+    const float hue = texture_hash(s->variant, 11, 0), tone = 0.7f + 0.5f * texture_hash(s->variant, 12, 0);
+    static const float covers[6][3] = {{0.55f, 0.13f, 0.11f}, {0.13f, 0.28f, 0.46f}, {0.16f, 0.38f, 0.22f},
+                                       {0.72f, 0.54f, 0.20f}, {0.40f, 0.20f, 0.38f}, {0.78f, 0.72f, 0.60f}};
+    memcpy(l->albedo, covers[(int)(6 * hue) % 6], 3 * sizeof *l->albedo);
+    texture_scale(l->albedo, tone);
+    if (between(fabsf(v), 0.075f, 0.092f))
+        set(l->albedo, 0.85f, 0.72f, 0.36f);
+    l->specular = 0.03f;
+    l->shininess = 30;
+}
+
+static void look_at_cloth(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    const float stripe = fabsf(v) / 0.30f;
+    set(l->albedo, 0.84f, 0.80f, 0.70f);
+    if (between(stripe, 0.80f, 0.93f) || between(stripe, 0.30f, 0.38f))
+        set(l->albedo, 0.66f, 0.16f, 0.14f);
+    else if (between(stripe, 0.62f, 0.74f))
+        set(l->albedo, 0.18f, 0.32f, 0.44f);
+    const float cross = u / 0.16f - floorf(u / 0.16f);
+    if (stripe < 0.26f && fabsf(cross - 0.5f) + stripe / 0.5f < 0.36f)
+        set(l->albedo, 0.20f, 0.40f, 0.36f);
+    texture_scale(l->albedo, 1 + 0.08f * texture_noise(55 * u, 55 * v, 0));
+}
+
+static void look_at_globe(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    /* Continents in the globe's own turned frame; parallels every 30 degrees. */
+    const float angle = 6.2831853f * u, height = -cosf(v / 0.17f);
+    const float ring = sqrtf(fmaxf(0, 1 - height * height)), x = ring * cosf(angle), y = ring * sinf(angle);
+    const float land = texture_fbm(1.7f * x + 3.1f, 1.7f * y + 1.4f, 1.7f * height + 5.2f, 4);
+    if (land > -0.04f) {
+        texture_mix(l->albedo, (const float[3]){0.36f, 0.52f, 0.20f}, (const float[3]){0.76f, 0.60f, 0.34f},
+                    texture_step(-0.04f, 0.30f, land));
+    } else {
+        texture_mix(l->albedo, (const float[3]){0.08f, 0.22f, 0.44f}, (const float[3]){0.24f, 0.52f, 0.66f},
+                    texture_step(-0.45f, -0.04f, land));
+    }
+    if (fabsf(height) > 0.88f + 0.04f * texture_noise(4 * x, 4 * y, 0))
+        set(l->albedo, 0.88f, 0.90f, 0.90f);
+}
+
+static void look_at_brass(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.60f, 0.42f, 0.16f);
+    l->specular = 0.18f;
+    l->shininess = 50;
+}
+
+static void look_at_ceramic(const surface *s, look *l)
+{
+    const float u = s->uv[0];
+    static const float glazes[3][3] = {{0.62f, 0.08f, 0.06f}, {0.06f, 0.22f, 0.48f}, {0.10f, 0.40f, 0.30f}};
+    memcpy(l->albedo, glazes[s->variant % 3], 3 * sizeof *l->albedo);
+    if (s->variant == 0 && ((int)floorf(24 * u) & 3) == 0)
+        set(l->albedo, 0.82f, 0.70f, 0.44f);
+    l->specular = 0.05f;
+    l->shininess = 90;
+    l->mirror = true;
+    l->roughness = 0.05f;
+}
+
+static void look_at_letter_block(const surface *s, look *l)
 {
     const float *p = s->position, u = s->uv[0], v = s->uv[1];
-    float *albedo = l->albedo;
-    int id[2];
-    switch (s->material) {
-    case FLOOR: {
-        const int i = (int)floorf(p[0] / 0.45f), j = (int)floorf(p[1] / 0.45f);
-        const float in_x = p[0] / 0.45f - (float)i, in_y = p[1] / 0.45f - (float)j;
-        const float shade =
-            0.85f + 0.2f * texture_hash(i, j, 3) + 0.10f * texture_fbm(5 * p[0], 5 * p[1], 0, 2);
-        if (((i + j) & 1) != 0)
-            set(albedo, 0.62f, 0.30f, 0.18f);
-        else
-            set(albedo, 0.74f, 0.66f, 0.52f);
-        texture_scale(albedo, shade);
-        if (fminf(fminf(in_x, 1 - in_x), fminf(in_y, 1 - in_y)) < 0.025f)
-            set(albedo, 0.36f, 0.32f, 0.28f);
-        l->specular = 0.03f;
-        l->shininess = 60;
-        break;
-    }
-    case RUG: {
-        const float r = hypotf(p[0], p[1]), angle = (float)atan2(p[1], p[0]);
-        const float wave = r + 0.035f * sinf(12 * angle);
-        if (wave < 0.42f)
-            set(albedo, 0.78f, 0.68f, 0.46f);
-        else if (wave < 0.75f)
-            set(albedo, 0.16f, 0.26f, 0.42f);
-        else if (wave < 0.95f)
-            set(albedo, 0.80f, 0.72f, 0.52f);
-        else if (wave < 1.12f)
-            set(albedo, 0.62f, 0.18f, 0.14f);
-        else
-            set(albedo, 0.14f, 0.22f, 0.36f);
-        texture_scale(albedo, 1 + 0.16f * texture_noise(40 * p[0], 40 * p[1], 0));
-        break;
-    }
-    case BRICK_WALL: {
-        const float edge = texture_brick(u, p[2], 0.34f, 0.125f, id);
-        if (edge < 0.009f)
-            set(albedo, 0.66f, 0.62f, 0.56f);
-        else {
-            texture_mix(albedo, (const float[3]){0.50f, 0.20f, 0.13f}, (const float[3]){0.68f, 0.36f, 0.24f},
-                        texture_hash(id[0], id[1], 7));
-            texture_scale(albedo, 1 + 0.14f * texture_fbm(9 * u, 14 * p[2], 2, 2));
-        }
-        break;
-    }
-    case PAPER_WALL: {
-        /* Wide stripes with a diamond on every dark one. */
-        const float stripe = u / 0.30f - floorf(u / 0.30f);
-        set(albedo, 0.60f, 0.68f, 0.58f);
-        if (stripe < 0.5f) {
-            set(albedo, 0.42f, 0.55f, 0.46f);
-            const float height = p[2] / 0.30f - floorf(p[2] / 0.30f);
-            if (fabsf(stripe - 0.25f) * 2 + fabsf(height - 0.5f) < 0.28f)
-                set(albedo, 0.84f, 0.78f, 0.54f);
-        }
-        texture_scale(albedo, 1 + 0.04f * texture_fbm(3 * u, 3 * p[2], 4, 2));
-        break;
-    }
-    case PLASTER_WALL:
-        set(albedo, 0.80f, 0.68f, 0.50f);
-        texture_scale(albedo, 0.95f + 0.12f * texture_fbm(1.6f * p[0], 1.6f * p[1], 1.6f * p[2], 4));
-        break;
-    case PANEL_WALL: {
-        const float board = u / 0.24f - floorf(u / 0.24f);
-        const int number = (int)floorf(u / 0.24f);
-        const float ring = texture_wood(0.7f * p[2] + 7 * texture_hash(number, 0, 1), board * 0.4f + 0.3f,
-                                        0.2f + 0.3f * texture_hash(number, 1, 1));
-        texture_mix(albedo, (const float[3]){0.34f, 0.42f, 0.50f}, (const float[3]){0.44f, 0.53f, 0.60f},
-                    ring);
-        if (board < 0.05f)
-            texture_scale(albedo, 0.45f);
-        break;
-    }
-    case WOOD:
-    case TABLE_TOP: {
-        const float plank = floorf(p[1] / 0.18f), offset = texture_hash((int)plank, 5, s->material);
-        const float ring =
-            texture_wood(1.1f * p[0] + 5 * offset, 1.6f * (p[1] - 0.18f * plank) + 0.25f + 0.2f * offset,
-                         0.5f * p[2] + 0.3f * offset);
-        texture_mix(albedo, (const float[3]){0.33f, 0.18f, 0.09f}, (const float[3]){0.60f, 0.37f, 0.19f},
-                    ring);
-        if (s->material == TABLE_TOP) {
-            texture_scale(albedo, 0.85f + 0.3f * offset);
-            if (p[1] / 0.18f - plank < 0.025f && s->normal[2] > 0.5f)
-                texture_scale(albedo, 0.5f);
-        }
-        l->specular = 0.03f;
-        l->shininess = 40;
-        break;
-    }
-    case PICTURE:
-        paint_picture(u / 0.36f, v / 0.27f, s->variant, albedo);
-        break;
-    case WINDOW: {
-        /* A painted view; it gives light of its own, as daylight behind a pane would. */
-        float out[3];
-        texture_mix(out, (const float[3]){0.95f, 0.90f, 0.80f}, (const float[3]){0.42f, 0.66f, 0.95f},
-                    texture_step(-0.3f, 0.6f, v));
-        const float cloud = texture_step(0.05f, 0.5f, texture_fbm(2.2f * u, 3.6f * v, 1, 3));
-        texture_mix(out, out, (const float[3]){1, 1, 1}, 0.8f * cloud);
-        if (v < -0.28f + 0.10f * texture_noise(2.1f * u, 0, 7))
-            set(out, 0.30f, 0.48f, 0.34f);
-        if (v < -0.40f + 0.08f * texture_noise(3.3f * u, 2, 3))
-            set(out, 0.20f, 0.36f, 0.16f);
-        for (int k = 0; k < 3; k++)
-            l->emission[k] = 0.8f * out[k];
-        set(albedo, 0.05f, 0.05f, 0.05f);
-        break;
-    }
-    case BOOK: {
-        const float hue = texture_hash(s->variant, 11, 0),
-                    tone = 0.7f + 0.5f * texture_hash(s->variant, 12, 0);
-        static const float covers[6][3] = {{0.55f, 0.13f, 0.11f}, {0.13f, 0.28f, 0.46f},
-                                           {0.16f, 0.38f, 0.22f}, {0.72f, 0.54f, 0.20f},
-                                           {0.40f, 0.20f, 0.38f}, {0.78f, 0.72f, 0.60f}};
-        memcpy(albedo, covers[(int)(6 * hue) % 6], 3 * sizeof *albedo);
-        texture_scale(albedo, tone);
-        if (between(fabsf(v), 0.075f, 0.092f))
-            set(albedo, 0.85f, 0.72f, 0.36f);
-        l->specular = 0.03f;
-        l->shininess = 30;
-        break;
-    }
-    case CLOTH: {
-        const float stripe = fabsf(v) / 0.30f;
-        set(albedo, 0.84f, 0.80f, 0.70f);
-        if (between(stripe, 0.80f, 0.93f) || between(stripe, 0.30f, 0.38f))
-            set(albedo, 0.66f, 0.16f, 0.14f);
-        else if (between(stripe, 0.62f, 0.74f))
-            set(albedo, 0.18f, 0.32f, 0.44f);
-        const float cross = u / 0.16f - floorf(u / 0.16f);
-        if (stripe < 0.26f && fabsf(cross - 0.5f) + stripe / 0.5f < 0.36f)
-            set(albedo, 0.20f, 0.40f, 0.36f);
-        texture_scale(albedo, 1 + 0.08f * texture_noise(55 * u, 55 * v, 0));
-        break;
-    }
-    case GLOBE: {
-        /* Continents in the globe's own turned frame; parallels every 30 degrees. */
-        const float angle = 6.2831853f * u, height = -cosf(v / 0.17f);
-        const float ring = sqrtf(fmaxf(0, 1 - height * height)), x = ring * cosf(angle),
-                    y = ring * sinf(angle);
-        const float land = texture_fbm(1.7f * x + 3.1f, 1.7f * y + 1.4f, 1.7f * height + 5.2f, 4);
-        if (land > -0.04f) {
-            texture_mix(albedo, (const float[3]){0.36f, 0.52f, 0.20f}, (const float[3]){0.76f, 0.60f, 0.34f},
-                        texture_step(-0.04f, 0.30f, land));
-        } else {
-            texture_mix(albedo, (const float[3]){0.08f, 0.22f, 0.44f}, (const float[3]){0.24f, 0.52f, 0.66f},
-                        texture_step(-0.45f, -0.04f, land));
-        }
-        if (fabsf(height) > 0.88f + 0.04f * texture_noise(4 * x, 4 * y, 0))
-            set(albedo, 0.88f, 0.90f, 0.90f);
-        break;
-    }
-    case BRASS:
-        set(albedo, 0.60f, 0.42f, 0.16f);
-        l->specular = 0.18f;
-        l->shininess = 50;
-        break;
-    case CERAMIC: {
-        static const float glazes[3][3] = {
-            {0.62f, 0.08f, 0.06f}, {0.06f, 0.22f, 0.48f}, {0.10f, 0.40f, 0.30f}};
-        memcpy(albedo, glazes[s->variant % 3], 3 * sizeof *albedo);
-        if (s->variant == 0 && ((int)floorf(24 * u) & 3) == 0)
-            set(albedo, 0.82f, 0.70f, 0.44f);
-        l->specular = 0.05f;
-        l->shininess = 90;
-        l->mirror = true;
-        l->roughness = 0.05f;
-        break;
-    }
-    case LETTER_BLOCK: {
-        /* Faces tell themselves apart by where they look; letters run round the block. */
-        static const char letters[6] = {'G', 'B', 'T', 'A', 'R', '3'};
-        static const float inks[5][3] = {{0.70f, 0.12f, 0.10f},
-                                         {0.10f, 0.28f, 0.58f},
-                                         {0.12f, 0.45f, 0.22f},
-                                         {0.82f, 0.50f, 0.10f},
-                                         {0.42f, 0.16f, 0.46f}};
-        const float half = 0.075f, a = u / half, b = v / half;
-        const int side = s->normal[2] > 0.5f
-                             ? 4
-                             : (int)floorf(((float)atan2(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
-        const float *ink = inks[(s->variant + side) % 5];
-        set(albedo, 0.86f, 0.76f, 0.56f);
-        texture_scale(albedo, 1 + 0.08f * texture_noise(12 * p[0], 12 * p[1], 60 * p[2]));
-        if (fmaxf(fabsf(a), fabsf(b)) > 0.80f ||
-            texture_glyph(letters[(s->variant + side) % 6], (a + 0.5f), (b + 0.6f) / 1.2f))
-            memcpy(albedo, ink, 3 * sizeof *albedo);
-        l->specular = 0.03f;
-        l->shininess = 30;
-        break;
-    }
-    case WIRE:
-        set(albedo, 0.12f, 0.12f, 0.13f);
-        l->specular = 0.08f;
-        l->shininess = 25;
-        break;
-    case FRUIT:
-        if (s->variant % 2 == 0)
-            texture_mix(albedo, (const float[3]){0.86f, 0.42f, 0.06f}, (const float[3]){0.92f, 0.58f, 0.12f},
-                        0.5f + 0.5f * texture_fbm(16 * p[0], 16 * p[1], 16 * p[2], 2));
-        else
-            texture_mix(albedo, (const float[3]){0.62f, 0.10f, 0.07f}, (const float[3]){0.70f, 0.62f, 0.16f},
-                        texture_step(0.1f, 0.6f, texture_fbm(9 * p[0], 9 * p[1], 9 * p[2], 2)));
-        l->specular = 0.04f;
-        l->shininess = 35;
-        break;
-    case VASE: {
-        const float band =
-            v / 0.055f + 0.35f * sinf(6.2831853f * 8 * u) * (((int)(v / 0.11f) & 1) != 0 ? 1.0f : 0.0f);
-        set(albedo, 0.86f, 0.84f, 0.78f);
-        if (((int)floorf(band) & 1) != 0)
-            set(albedo, 0.12f, 0.24f, 0.46f);
-        l->specular = 0.05f;
-        l->shininess = 70;
-        break;
-    }
-    case LEAF: {
-        const float tone = texture_hash(s->variant, 21, 0);
-        texture_mix(albedo, (const float[3]){0.14f, 0.34f, 0.10f}, (const float[3]){0.36f, 0.52f, 0.16f},
-                    tone);
-        if (fabsf(u) < 0.06f)
-            texture_scale(albedo, 1.5f);
-        l->specular = 0.03f;
-        l->shininess = 20;
-        break;
-    }
-    case POT:
-        set(albedo, 0.64f, 0.34f, 0.20f);
-        if (v > 0.30f && ((int)floorf(20 * u + 0.5f) & 1) != 0)
-            set(albedo, 0.82f, 0.70f, 0.50f);
-        texture_scale(albedo, 1 + 0.12f * texture_fbm(9 * p[0], 9 * p[1], 9 * p[2], 2));
-        break;
-    case WHITE_PAINT:
-        set(albedo, 0.82f, 0.80f, 0.74f);
-        break;
-    case CURTAIN: {
-        const float fold = sinf(38 * u);
-        texture_mix(albedo, (const float[3]){0.56f, 0.16f, 0.13f}, (const float[3]){0.78f, 0.30f, 0.20f},
-                    0.5f + 0.5f * fold);
-        break;
-    }
-    case SOIL:
-        set(albedo, 0.16f, 0.11f, 0.08f);
-        break;
-    default: /* CUP */
-        set(albedo, 0.84f, 0.82f, 0.76f);
-        if (between(v, 0.125f, 0.15f) || between(v, 0.075f, 0.085f))
-            set(albedo, 0.10f, 0.45f, 0.45f);
-        l->specular = 0.05f;
-        l->shininess = 80;
-        break;
-    }
+    /* Faces tell themselves apart by where they look; letters run round the block. */
+    static const char letters[6] = {'G', 'B', 'T', 'A', 'R', '3'};
+    static const float inks[5][3] = {{0.70f, 0.12f, 0.10f},
+                                     {0.10f, 0.28f, 0.58f},
+                                     {0.12f, 0.45f, 0.22f},
+                                     {0.82f, 0.50f, 0.10f},
+                                     {0.42f, 0.16f, 0.46f}};
+    const float half = 0.075f, a = u / half, b = v / half;
+    const int side = s->normal[2] > 0.5f
+                         ? 4
+                         : (int)floorf(((float)atan2(s->normal[1], s->normal[0]) + 6.6f) / 1.5708f) & 3;
+    const float *ink = inks[(s->variant + side) % 5];
+    set(l->albedo, 0.86f, 0.76f, 0.56f);
+    texture_scale(l->albedo, 1 + 0.08f * texture_noise(12 * p[0], 12 * p[1], 60 * p[2]));
+    if (fmaxf(fabsf(a), fabsf(b)) > 0.80f ||
+        texture_glyph(letters[(s->variant + side) % 6], (a + 0.5f), (b + 0.6f) / 1.2f))
+        memcpy(l->albedo, ink, 3 * sizeof *l->albedo);
+    l->specular = 0.03f;
+    l->shininess = 30;
+}
+
+static void look_at_wire(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.12f, 0.12f, 0.13f);
+    l->specular = 0.08f;
+    l->shininess = 25;
+}
+
+static void look_at_fruit(const surface *s, look *l)
+{
+    const float *p = s->position;
+    if (s->variant % 2 == 0)
+        texture_mix(l->albedo, (const float[3]){0.86f, 0.42f, 0.06f}, (const float[3]){0.92f, 0.58f, 0.12f},
+                    0.5f + 0.5f * texture_fbm(16 * p[0], 16 * p[1], 16 * p[2], 2));
+    else
+        texture_mix(l->albedo, (const float[3]){0.62f, 0.10f, 0.07f}, (const float[3]){0.70f, 0.62f, 0.16f},
+                    texture_step(0.1f, 0.6f, texture_fbm(9 * p[0], 9 * p[1], 9 * p[2], 2)));
+    l->specular = 0.04f;
+    l->shininess = 35;
+}
+
+static void look_at_vase(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    const float band =
+        v / 0.055f + 0.35f * sinf(6.2831853f * 8 * u) * (((int)(v / 0.11f) & 1) != 0 ? 1.0f : 0.0f);
+    set(l->albedo, 0.86f, 0.84f, 0.78f);
+    if (((int)floorf(band) & 1) != 0)
+        set(l->albedo, 0.12f, 0.24f, 0.46f);
+    l->specular = 0.05f;
+    l->shininess = 70;
+}
+
+static void look_at_leaf(const surface *s, look *l)
+{
+    const float u = s->uv[0];
+    const float tone = texture_hash(s->variant, 21, 0);
+    texture_mix(l->albedo, (const float[3]){0.14f, 0.34f, 0.10f}, (const float[3]){0.36f, 0.52f, 0.16f},
+                tone);
+    if (fabsf(u) < 0.06f)
+        texture_scale(l->albedo, 1.5f);
+    l->specular = 0.03f;
+    l->shininess = 20;
+}
+
+static void look_at_pot(const surface *s, look *l)
+{
+    const float *p = s->position, u = s->uv[0], v = s->uv[1];
+    set(l->albedo, 0.64f, 0.34f, 0.20f);
+    if (v > 0.30f && ((int)floorf(20 * u + 0.5f) & 1) != 0)
+        set(l->albedo, 0.82f, 0.70f, 0.50f);
+    texture_scale(l->albedo, 1 + 0.12f * texture_fbm(9 * p[0], 9 * p[1], 9 * p[2], 2));
+}
+
+static void look_at_white_paint(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.82f, 0.80f, 0.74f);
+}
+
+static void look_at_curtain(const surface *s, look *l)
+{
+    const float u = s->uv[0];
+    const float fold = sinf(38 * u);
+    texture_mix(l->albedo, (const float[3]){0.56f, 0.16f, 0.13f}, (const float[3]){0.78f, 0.30f, 0.20f},
+                0.5f + 0.5f * fold);
+}
+
+static void look_at_soil(const surface *s, look *l)
+{
+    (void)s;
+    set(l->albedo, 0.16f, 0.11f, 0.08f);
+}
+
+static void look_at_cup(const surface *s, look *l)
+{
+    const float v = s->uv[1];
+    set(l->albedo, 0.84f, 0.82f, 0.76f);
+    if (between(v, 0.125f, 0.15f) || between(v, 0.075f, 0.085f))
+        set(l->albedo, 0.10f, 0.45f, 0.45f);
+    l->specular = 0.05f;
+    l->shininess = 80;
+}
+
+static void look_at_room(const surface *s, look *l)
+{
+    static look_fn *const looks[] = {
+        [FLOOR] = look_at_floor,
+        [RUG] = look_at_rug,
+        [BRICK_WALL] = look_at_brick_wall,
+        [PAPER_WALL] = look_at_paper_wall,
+        [PLASTER_WALL] = look_at_plaster_wall,
+        [PANEL_WALL] = look_at_panel_wall,
+        [WOOD] = look_at_wood,
+        [TABLE_TOP] = look_at_wood,
+        [PICTURE] = look_at_picture,
+        [WINDOW] = look_at_window,
+        [BOOK] = look_at_book,
+        [CLOTH] = look_at_cloth,
+        [GLOBE] = look_at_globe,
+        [BRASS] = look_at_brass,
+        [CERAMIC] = look_at_ceramic,
+        [LETTER_BLOCK] = look_at_letter_block,
+        [WIRE] = look_at_wire,
+        [FRUIT] = look_at_fruit,
+        [VASE] = look_at_vase,
+        [LEAF] = look_at_leaf,
+        [POT] = look_at_pot,
+        [WHITE_PAINT] = look_at_white_paint,
+        [CURTAIN] = look_at_curtain,
+        [SOIL] = look_at_soil,
+        [CUP] = look_at_cup,
+    };
+    looks[s->material](s, l);
 }
 
 /** A leaf: a strip of `width` that rises from the origin towards `angle` and bends over. */

@@ -26,84 +26,110 @@ static float ground_height(float x, float y)
     return (hills + (calm - hills) * strip) + rim + lake * (1 - strip) + 0.15f;
 }
 
+static void look_at_ground(const surface *s, look *l)
+{
+    const float *p = s->position;
+    static const float sand[3] = {0.68f, 0.58f, 0.40f}, meadow[3] = {0.30f, 0.42f, 0.14f},
+                       dry[3] = {0.56f, 0.50f, 0.24f};
+    static const float rock[3] = {0.44f, 0.40f, 0.36f}, snow[3] = {0.86f, 0.88f, 0.90f},
+                       road[3] = {0.66f, 0.58f, 0.46f};
+    texture_mix(l->albedo, meadow, dry,
+                texture_step(-0.25f, 0.35f, texture_fbm(0.35f * p[0], 0.35f * p[1], 2, 4)));
+    texture_scale(l->albedo, 1 + 0.18f * texture_noise(2.6f * p[0], 2.6f * p[1], 0));
+    texture_mix(l->albedo, l->albedo, rock, texture_step(0.88f, 0.72f, s->normal[2]));
+    if (s->normal[2] > 0.6f)
+        texture_mix(l->albedo, l->albedo, snow,
+                    texture_step(7.0f, 9.0f, p[2] + texture_fbm(p[0], p[1], 0, 2)));
+    texture_mix(l->albedo, l->albedo, sand, texture_step(lake_level + 0.30f, lake_level + 0.12f, p[2]));
+    texture_mix(l->albedo, l->albedo, road, texture_step(0.26f, 0.20f, fabsf(p[1] - road_y(p[0]))));
+}
+
+static void look_at_lake(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.05f, 0.20f, 0.28f}, (const float[3]){0.10f, 0.32f, 0.36f},
+                0.5f + 0.5f * texture_fbm(0.7f * p[0], 2 * p[1], 0, 3));
+    l->specular = 0.03f;
+    l->shininess = 60;
+    l->mirror = true;
+    l->roughness = 0.02f;
+}
+
+static void look_at_house_wall(const surface *s, look *l)
+{
+    const float u = s->uv[0], v = s->uv[1];
+    static const float paints[4][3] = {
+        {0.82f, 0.76f, 0.62f}, {0.76f, 0.58f, 0.42f}, {0.80f, 0.80f, 0.76f}, {0.66f, 0.48f, 0.38f}};
+    memcpy(l->albedo, paints[s->variant % 4], 3 * sizeof *l->albedo);
+    const float column = u / 0.30f - floorf(u / 0.30f), row = v / 0.34f - floorf(v / 0.34f);
+    if (s->normal[2] < 0.5f && fabsf(column - 0.5f) < 0.20f && fabsf(row - 0.5f) < 0.24f) {
+        l->albedo[0] = 0.14f;
+        l->albedo[1] = 0.18f;
+        l->albedo[2] = 0.24f;
+    }
+}
+
+static void look_at_house_roof(const surface *s, look *l)
+{
+    const float v = s->uv[1];
+    texture_mix(l->albedo, (const float[3]){0.50f, 0.18f, 0.11f}, (const float[3]){0.66f, 0.32f, 0.19f},
+                texture_hash(s->variant, 4, 4));
+    if (v / 0.14f - floorf(v / 0.14f) < 0.25f)
+        texture_scale(l->albedo, 0.78f);
+}
+
+static void look_at_tower(const surface *s, look *l)
+{
+    const float *p = s->position, u = s->uv[0];
+    l->albedo[0] = 0.70f;
+    l->albedo[1] = 0.66f;
+    l->albedo[2] = 0.58f;
+    if (p[2] > 1.2f && ((int)floorf(u / 0.2f) & 1) != 0)
+        texture_scale(l->albedo, 0.75f);
+}
+
+static void look_at_leaves(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.12f, 0.26f, 0.06f}, (const float[3]){0.44f, 0.48f, 0.13f},
+                texture_step(-0.5f, 0.5f, texture_fbm(4 * p[0], 4 * p[1], 4 * p[2], 2)));
+}
+
+static void look_at_needles(const surface *s, look *l)
+{
+    const float *p = s->position;
+    texture_mix(l->albedo, (const float[3]){0.05f, 0.16f, 0.09f}, (const float[3]){0.14f, 0.30f, 0.15f},
+                texture_step(-0.5f, 0.5f, texture_fbm(5 * p[0], 5 * p[1], 5 * p[2], 2)));
+}
+
+static void look_at_trunk(const surface *s, look *l)
+{
+    (void)s;
+    l->albedo[0] = 0.30f;
+    l->albedo[1] = 0.21f;
+    l->albedo[2] = 0.14f;
+}
+
+static void look_at_sky(const surface *s, look *l)
+{
+    const float *p = s->position;
+    float out[3];
+    texture_mix(out, (const float[3]){0.86f, 0.88f, 0.92f}, (const float[3]){0.36f, 0.58f, 0.94f},
+                texture_step(-0.05f, 0.6f, p[2] / dome_radius));
+    const float cloud = texture_step(0.05f, 0.45f, texture_fbm(0.06f * p[0], 0.06f * p[1], 0.15f * p[2], 4));
+    texture_mix(out, out, (const float[3]){1.05f, 1.03f, 1.0f}, 0.8f * cloud);
+    for (int k = 0; k < 3; k++)
+        l->emission[k] = 0.75f * out[k];
+}
+
 static void look_at_land(const surface *s, look *l)
 {
-    const float *p = s->position, u = s->uv[0], v = s->uv[1];
-    float *albedo = l->albedo;
-    switch (s->material) {
-    case GROUND: {
-        static const float sand[3] = {0.68f, 0.58f, 0.40f}, meadow[3] = {0.30f, 0.42f, 0.14f},
-                           dry[3] = {0.56f, 0.50f, 0.24f};
-        static const float rock[3] = {0.44f, 0.40f, 0.36f}, snow[3] = {0.86f, 0.88f, 0.90f},
-                           road[3] = {0.66f, 0.58f, 0.46f};
-        texture_mix(albedo, meadow, dry,
-                    texture_step(-0.25f, 0.35f, texture_fbm(0.35f * p[0], 0.35f * p[1], 2, 4)));
-        texture_scale(albedo, 1 + 0.18f * texture_noise(2.6f * p[0], 2.6f * p[1], 0));
-        texture_mix(albedo, albedo, rock, texture_step(0.88f, 0.72f, s->normal[2]));
-        if (s->normal[2] > 0.6f)
-            texture_mix(albedo, albedo, snow, texture_step(7.0f, 9.0f, p[2] + texture_fbm(p[0], p[1], 0, 2)));
-        texture_mix(albedo, albedo, sand, texture_step(lake_level + 0.30f, lake_level + 0.12f, p[2]));
-        texture_mix(albedo, albedo, road, texture_step(0.26f, 0.20f, fabsf(p[1] - road_y(p[0]))));
-        break;
-    }
-    case LAKE:
-        texture_mix(albedo, (const float[3]){0.05f, 0.20f, 0.28f}, (const float[3]){0.10f, 0.32f, 0.36f},
-                    0.5f + 0.5f * texture_fbm(0.7f * p[0], 2 * p[1], 0, 3));
-        l->specular = 0.03f;
-        l->shininess = 60;
-        l->mirror = true;
-        l->roughness = 0.02f;
-        break;
-    case HOUSE_WALL: {
-        static const float paints[4][3] = {
-            {0.82f, 0.76f, 0.62f}, {0.76f, 0.58f, 0.42f}, {0.80f, 0.80f, 0.76f}, {0.66f, 0.48f, 0.38f}};
-        memcpy(albedo, paints[s->variant % 4], 3 * sizeof *albedo);
-        const float column = u / 0.30f - floorf(u / 0.30f), row = v / 0.34f - floorf(v / 0.34f);
-        if (s->normal[2] < 0.5f && fabsf(column - 0.5f) < 0.20f && fabsf(row - 0.5f) < 0.24f) {
-            albedo[0] = 0.14f;
-            albedo[1] = 0.18f;
-            albedo[2] = 0.24f;
-        }
-        break;
-    }
-    case HOUSE_ROOF:
-        texture_mix(albedo, (const float[3]){0.50f, 0.18f, 0.11f}, (const float[3]){0.66f, 0.32f, 0.19f},
-                    texture_hash(s->variant, 4, 4));
-        if (v / 0.14f - floorf(v / 0.14f) < 0.25f)
-            texture_scale(albedo, 0.78f);
-        break;
-    case TOWER:
-        albedo[0] = 0.70f;
-        albedo[1] = 0.66f;
-        albedo[2] = 0.58f;
-        if (p[2] > 1.2f && ((int)floorf(u / 0.2f) & 1) != 0)
-            texture_scale(albedo, 0.75f);
-        break;
-    case LEAVES:
-        texture_mix(albedo, (const float[3]){0.12f, 0.26f, 0.06f}, (const float[3]){0.44f, 0.48f, 0.13f},
-                    texture_step(-0.5f, 0.5f, texture_fbm(4 * p[0], 4 * p[1], 4 * p[2], 2)));
-        break;
-    case NEEDLES:
-        texture_mix(albedo, (const float[3]){0.05f, 0.16f, 0.09f}, (const float[3]){0.14f, 0.30f, 0.15f},
-                    texture_step(-0.5f, 0.5f, texture_fbm(5 * p[0], 5 * p[1], 5 * p[2], 2)));
-        break;
-    case TRUNK:
-        albedo[0] = 0.30f;
-        albedo[1] = 0.21f;
-        albedo[2] = 0.14f;
-        break;
-    default: { /* SKY */
-        float out[3];
-        texture_mix(out, (const float[3]){0.86f, 0.88f, 0.92f}, (const float[3]){0.36f, 0.58f, 0.94f},
-                    texture_step(-0.05f, 0.6f, p[2] / dome_radius));
-        const float cloud =
-            texture_step(0.05f, 0.45f, texture_fbm(0.06f * p[0], 0.06f * p[1], 0.15f * p[2], 4));
-        texture_mix(out, out, (const float[3]){1.05f, 1.03f, 1.0f}, 0.8f * cloud);
-        for (int k = 0; k < 3; k++)
-            l->emission[k] = 0.75f * out[k];
-        break;
-    }
-    }
+    static look_fn *const looks[] = {
+        [GROUND] = look_at_ground,         [LAKE] = look_at_lake,   [HOUSE_WALL] = look_at_house_wall,
+        [HOUSE_ROOF] = look_at_house_roof, [TOWER] = look_at_tower, [LEAVES] = look_at_leaves,
+        [NEEDLES] = look_at_needles,       [TRUNK] = look_at_trunk, [SKY] = look_at_sky,
+    };
+    looks[s->material](s, l);
 }
 
 static void build_house(world *w, int number, float x, float y, float turn_rad, float length, float height)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/file.c -- whole files to bytes and back. */
+/* base/file.c -- files read whole or in part; folders, locks and paths. */
 #include "base/file.h"
 
 #include <ctype.h>

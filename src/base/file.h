@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/file.h -- whole files to bytes and back; the only place that opens files by itself (images go through
-   base/image.h). */
+/* base/file.h -- whole files to bytes and back; folders, locks and paths. Images: base/image.h. */
 #ifndef GBT_BASE_FILE_H
 #define GBT_BASE_FILE_H
 

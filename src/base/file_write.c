@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/file_write.c -- a whole file at once, in the way of large ones. */
+/* base/file_write.c -- a whole file at once. */
 #include "base/file.h"
 
 #include <poll.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/large_file.c -- files that are larger than memory, piece by piece. */
+/* base/large_file.c -- files written and read piece by piece; how every file is replaced atomically. */
 #include "base/large_file.h"
 
 #include <errno.h>

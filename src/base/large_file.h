@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/large_file.h -- files that are larger than memory, piece by piece. */
+/* base/large_file.h -- files written and read piece by piece, so that they may be larger than memory. */
 #ifndef GBT_BASE_LARGE_FILE_H
 #define GBT_BASE_LARGE_FILE_H
 

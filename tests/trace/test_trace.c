@@ -1039,7 +1039,7 @@ static void small_spheres_far_away(void **state)
 {
     (void)state;
     enum { W = 32, RAYS = 16 * W };
-    static const trace_kernel kernels[] = {TRACE_TILE, TRACE_SINGLE, TRACE_EMBREE};
+    static const trace_kernel kernels[] = {TRACE_TREE, TRACE_SINGLE, TRACE_EMBREE};
     static const double places[][2] = {{0.005, 1e5}, {0.05, 1e6}, {0.005, 1e6}, {0.5, 1e7}}; /* size, where */
     static float origin[3 * RAYS], dir[3 * RAYS], T[RAYS];
     static double want_rgb[3 * RAYS], want[RAYS];

@@ -168,7 +168,7 @@ static size_t full_bytes(const photos *p, size_t view)
 {
     const scene_view *v = &p->source->views[view];
     const int more = p->full[view] == NULL ? (v->mask_path != NULL) + v->has_alpha
-                                           : (p->full_valid[view] != NULL) + (p->through[view] != NULL);
+                                           : (p->full_valid[view] != NULL) + (p->transparency[view] != NULL);
     return (size_t)(3 + more) * pixel_count(p, view, 0);
 }
 

@@ -7,6 +7,9 @@
 
 #include "trace/list_rows16.h"
 
+/* The passes over a packet: each has the registers to itself. */
+#define PASS __attribute__((noinline))
+
 enum { AHEAD = 12 /* records that are asked for before they are read */ };
 
 /* The Gaussians that a tile has blended. */
@@ -52,8 +55,8 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
 }
 
 /* Evaluate the rows of a packet again, in the order of the tape, and find T of all of them. */
-static void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
-                        packet_hits *out)
+static PASS void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry,
+                             size_t count, packet_hits *out)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -117,8 +120,8 @@ static inline __attribute__((always_inline)) vfloat16 step_on(const packet_hits 
    first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
    their nearest hits. Only sums of what has been added, so nothing cancels. False when it takes too many
    steps: `term` and `behind` are then to be found ray by ray. */
-static bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
-                           vfloat16 background)
+static PASS bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
+                                vfloat16 background)
 {
     const packet_hits copy = *out, *const rows = &copy; /* what stores cannot change */
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
@@ -201,23 +204,26 @@ static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_
     *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
-/* The sums of a row over the rays, to those of its Gaussian. */
+/* The sums of a row over the rays, to those of its Gaussian. Products of lanes eight apart are added as they
+   are multiplied. */
 static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], const vfloat16 d_rgb[3],
                             float *to)
 {
-    vfloat16 terms[16], hv[3];
-    terms[SLOT_H] = h;
+    vfloat8 terms[16];
+    vfloat16 hv[3];
+    terms[SLOT_H] = vfloat16_fold(h);
     for (int k = 0; k < 3; k++) {
-        terms[SLOT_HV + k] = hv[k] = vfloat16_mul(h, v[k]);
-        terms[SLOT_HVV + k] = vfloat16_mul(hv[k], v[k]);
-        terms[SLOT_COLOR + k] = vfloat16_mul(weight, d_rgb[k]);
+        hv[k] = vfloat16_mul(h, v[k]);
+        terms[SLOT_HV + k] = vfloat16_fold(hv[k]);
+        terms[SLOT_HVV + k] = vfloat16_fold_product(hv[k], v[k]);
+        terms[SLOT_COLOR + k] = vfloat16_fold_product(weight, d_rgb[k]);
     }
-    terms[SLOT_HVV + 3] = vfloat16_mul(hv[1], v[2]);
-    terms[SLOT_HVV + 4] = vfloat16_mul(hv[2], v[0]);
-    terms[SLOT_HVV + 5] = vfloat16_mul(hv[0], v[1]);
-    terms[SLOT_WEIGHT] = weight;
-    terms[14] = terms[15] = vfloat16_set1(0);
-    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat16_sum_rows(terms)));
+    terms[SLOT_HVV + 3] = vfloat16_fold_product(hv[1], v[2]);
+    terms[SLOT_HVV + 4] = vfloat16_fold_product(hv[2], v[0]);
+    terms[SLOT_HVV + 5] = vfloat16_fold_product(hv[0], v[1]);
+    terms[SLOT_WEIGHT] = vfloat16_fold(weight);
+    terms[14] = terms[15] = vfloat16_fold(vfloat16_set1(0));
+    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat8_sum_rows(terms)));
 }
 
 /* Those of a row that the form does not hold for. */
@@ -238,8 +244,8 @@ static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint
 
 /* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
    (turn_sums). */
-static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
-                     const packet_hits *from, gradient_slot *sums)
+static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
+                          const packet_hits *from, gradient_slot *sums)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -284,8 +290,9 @@ static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16
 /* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
    all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
  */
-static void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
-                         vfloat16 T, vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
+static PASS void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry,
+                              size_t count, vfloat16 T, vfloat16 behind, const vfloat16 direction[3],
+                              gradient_slot *sums)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;

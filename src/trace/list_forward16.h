@@ -15,9 +15,8 @@ typedef struct row_queue {
 
 /* What the rays of a packet still see. */
 typedef struct ray_limits {
-    vfloat16 far;  /* hits at this depth or behind are not seen */
-    vfloat16 near; /* of parts of rays: nor are hits nearer than this */
-    bool parts;
+    vfloat16 far;     /* hits at this depth or behind are not seen */
+    vfloat16 near;    /* nor are hits nearer than this; 0 but for parts of rays */
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
 } ray_limits;
@@ -28,9 +27,8 @@ static inline void append_response(const packet_hits *rows, size_t *count, const
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
-    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, limits->far));
-    if (limits->parts)
-        hit = vmask16_and(hit, vfloat16_le(limits->near, r.t));
+    const vmask16 seen = vmask16_and(vfloat16_lt(r.t, limits->far), vfloat16_le(limits->near, r.t)),
+                  hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), seen);
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
@@ -79,7 +77,6 @@ static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits
     ray_limits limits = {.far =
                              vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
                          .near = parts ? vfloat16_load(rays->near) : zero,
-                         .parts = parts,
                          .product = parts ? vfloat16_load(rays->T_front) : vfloat16_set1(1),
                          .reached = zero};
     row_queue queue = {.count = 0};

@@ -65,8 +65,8 @@ static void evaluate_queue(const packet_pass *p, const tile_list *list, const ro
 }
 
 /* All rows that can be seen. */
-static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
-                        kernel_counters *counters)
+static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
+                             kernel_counters *counters)
 {
     const packet_rays *rays = p->rays;
     const bool parts = p->parts;
@@ -105,8 +105,24 @@ static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits
     }
 }
 
-static bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
-                       packet_output *out, hit_tape *tape, kernel_counters *counters)
+/* How far rows go back, into the entries `begin` to `end` of a packet. A row that has none writes into that
+   of the next one, which may go back farther than it has to. */
+static void note_back(const packet_hits *rows, tape_entry *entries, size_t begin, size_t end)
+{
+    for (size_t k = 0; k < rows->back_count; k++) {
+        const uint32_t at = rows->kept[rows->back[k].place];
+        if (at == end)
+            break;
+        const uint32_t past = at - rows->kept[rows->back[k].place - rows->back[k].past];
+        const uint32_t told = past < TAPE_SORTED ? past : TAPE_SORTED;
+        entries[at].packet = (uint16_t)((entries[at].packet & (TILE_PACKETS - 1)) | told << TAPE_BACK);
+    }
+    for (size_t k = begin; k < end && rows->crowded; k++)
+        entries[k].packet |= TAPE_SORTED << TAPE_BACK;
+}
+
+static PASS bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
+                            packet_output *out, hit_tape *tape, kernel_counters *counters)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -147,12 +163,15 @@ static bool blend_list(const packet_pass *p, const tile_list *list, const packet
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
+            rows->kept[i] = (uint32_t)kept;
             entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
             kept += bits != 0;
         }
     }
-    if (tape != NULL)
+    if (tape != NULL) {
+        note_back(from, tape->entries, tape->count, kept);
         tape->count = kept;
+    }
     if (tape != NULL && one_order)
         vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
     counters->hits += hits;

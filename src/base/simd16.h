@@ -6,7 +6,7 @@
    order; so a kernel's result does not depend on the machine. The plain form is the definition; a file that
    defines SIMD16_PLAIN gets it where the compiler has vectors, too.
 
-   vfloat16: 16 floats; vmask16: 16 truth values. */
+   vfloat16: 16 floats; vfloat8: 8, sums of lanes that are eight apart; vmask16: 16 truth values. */
 #ifndef GBT_BASE_SIMD16_H
 #define GBT_BASE_SIMD16_H
 

@@ -3,7 +3,7 @@
 #ifndef GBT_BASE_SIMD16_AVX2_H
 #define GBT_BASE_SIMD16_AVX2_H
 
-#include <immintrin.h>
+#include "base/simd8_sum.h"
 
 typedef struct vfloat16 {
     __m256 a, b;
@@ -148,6 +148,17 @@ VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm256_add_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm256_min_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm256_max_ps)
 #undef VFLOAT16_REDUCE_ROWS
+
+typedef __m256 vfloat8;
+static inline vfloat8 vfloat16_fold(vfloat16 x) { return _mm256_add_ps(x.a, x.b); }
+static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
+{
+    return _mm256_fmadd_ps(x.b, y.b, _mm256_mul_ps(x.a, y.a));
+}
+static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
+{
+    return (vfloat16){sum8_rows(in), sum8_rows(in + 8)};
+}
 
 /* Eight rows of eight, turned. */
 static inline void turn8(const float *const rows[8], __m256 out[8])

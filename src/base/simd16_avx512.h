@@ -3,7 +3,7 @@
 #ifndef GBT_BASE_SIMD16_AVX512_H
 #define GBT_BASE_SIMD16_AVX512_H
 
-#include <immintrin.h>
+#include "base/simd8_sum.h"
 
 typedef __m512 vfloat16;
 typedef __mmask16 vmask16;
@@ -114,6 +114,21 @@ VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm512_add_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm512_min_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm512_max_ps)
 #undef VFLOAT16_REDUCE_ROWS
+
+typedef __m256 vfloat8;
+static inline vfloat8 vfloat16_fold(vfloat16 x)
+{
+    return _mm256_add_ps(_mm512_castps512_ps256(x), _mm512_extractf32x8_ps(x, 1));
+}
+static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
+{
+    return _mm256_fmadd_ps(_mm512_extractf32x8_ps(x, 1), _mm512_extractf32x8_ps(y, 1),
+                           _mm256_mul_ps(_mm512_castps512_ps256(x), _mm512_castps512_ps256(y)));
+}
+static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
+{
+    return _mm512_insertf32x8(_mm512_castps256_ps512(sum8_rows(in)), sum8_rows(in + 8), 1);
+}
 
 /* out[j] lane i = rows[i][j]: sixteen rows of sixteen floats, turned. */
 static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])

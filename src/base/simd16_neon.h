@@ -139,13 +139,16 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
 
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
     static inline float32x4_t name##_lanes(vfloat16 x) { return op(op(x.a, x.c), op(x.b, x.d)); }            \
-    static inline float32x4_t name##_four(const vfloat16 *in)                                                \
+    static inline float32x4_t name##_turned(float32x4_t x, float32x4_t y, float32x4_t z, float32x4_t w)      \
     {                                                                                                        \
-        const float32x4_t x = name##_lanes(in[0]), y = name##_lanes(in[1]), z = name##_lanes(in[2]),         \
-                          w = name##_lanes(in[3]);                                                           \
         const float32x4_t xy = op(lower_halves(x, y), upper_halves(x, y));                                   \
         const float32x4_t zw = op(lower_halves(z, w), upper_halves(z, w));                                   \
         return op(vuzp1q_f32(xy, zw), vuzp2q_f32(xy, zw));                                                   \
+    }                                                                                                        \
+    static inline float32x4_t name##_four(const vfloat16 *in)                                                \
+    {                                                                                                        \
+        return name##_turned(name##_lanes(in[0]), name##_lanes(in[1]), name##_lanes(in[2]),                  \
+                             name##_lanes(in[3]));                                                           \
     }                                                                                                        \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \
@@ -157,6 +160,27 @@ VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, greater4)
 #undef VFLOAT16_REDUCE_ROWS
 #undef VFLOAT16_PAIRS
 #undef VFLOAT16_EACH
+
+typedef struct vfloat8 {
+    float32x4_t a, b;
+} vfloat8;
+static inline vfloat8 vfloat16_fold(vfloat16 x)
+{
+    return (vfloat8){vaddq_f32(x.a, x.c), vaddq_f32(x.b, x.d)};
+}
+static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
+{
+    return (vfloat8){vfmaq_f32(vmulq_f32(x.a, y.a), x.c, y.c), vfmaq_f32(vmulq_f32(x.b, y.b), x.d, y.d)};
+}
+static inline float32x4_t sum4_rows(const vfloat8 *in)
+{
+    return vfloat16_sum_rows_turned(vaddq_f32(in[0].a, in[0].b), vaddq_f32(in[1].a, in[1].b),
+                                    vaddq_f32(in[2].a, in[2].b), vaddq_f32(in[3].a, in[3].b));
+}
+static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
+{
+    return (vfloat16){sum4_rows(in), sum4_rows(in + 4), sum4_rows(in + 8), sum4_rows(in + 12)};
+}
 
 /* Four rows of four, turned. */
 static inline void turn4(const float *const rows[4], size_t column, float32x4_t out[4])

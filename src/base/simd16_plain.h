@@ -138,6 +138,34 @@ static inline vfloat16 vfloat16_sum_rows(const vfloat16 in[16])
     }
     return out;
 }
+/* The first step of that by itself, of x and of x y, and the others. */
+typedef struct vfloat8 {
+    float v[8];
+} vfloat8;
+static inline vfloat8 vfloat16_fold(vfloat16 x)
+{
+    vfloat8 r;
+    for (int i = 0; i < 8; i++)
+        r.v[i] = x.v[i] + x.v[i + 8];
+    return r;
+}
+static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
+{
+    vfloat8 r;
+    for (int i = 0; i < 8; i++)
+        r.v[i] = fmaf(x.v[i + 8], y.v[i + 8], x.v[i] * y.v[i]);
+    return r;
+}
+static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
+{
+    vfloat16 out;
+    EACH
+    {
+        const float *e = in[i].v;
+        out.v[i] = ((e[0] + e[4]) + (e[2] + e[6])) + ((e[1] + e[5]) + (e[3] + e[7]));
+    }
+    return out;
+}
 static inline vfloat16 vfloat16_min_rows(const vfloat16 in[16])
 {
     vfloat16 out;

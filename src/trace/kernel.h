@@ -57,13 +57,18 @@ typedef struct packet_output {
     _Alignas(64) uint32_t strongest[PACKET_LANES];
 } packet_output;
 
-/* What forward leaves for backward, per tile: the Gaussians that were blended, closed by TAPE_END. */
+/* What forward leaves for backward, per tile: the Gaussians that were blended; through the tree closed by
+   TAPE_END. */
 enum { TAPE_SINGLE = 0x4000, TAPE_END = 0x8000 };
+/* Over lists a packet's number has TAPE_BACK bits; above them stands how many of the packet's entries the row
+   goes back past (list_rows16.h), as far as they are more than two; TAPE_SORTED: T is to be found by sorting.
+ */
+enum { TAPE_BACK = 4, TAPE_SORTED = 0xFFFF >> TAPE_BACK };
 typedef struct tape_entry {
     uint32_t id;
     uint16_t lanes;  /* bit per ray that blended it; with TAPE_SINGLE: the one ray's number, and entries of a
                         ray are in blending order */
-    uint16_t packet; /* number in the tile, or flags */
+    uint16_t packet; /* number in the tile, or flags; over lists, with TAPE_BACK */
 } tape_entry;
 
 typedef struct hit_tape {

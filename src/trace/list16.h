@@ -251,23 +251,21 @@ static inline vfloat16 count_where(vmask16 m, vfloat16 count)
     return vfloat16_add_where(m, count, vfloat16_set1(1));
 }
 
-/* out[place] = bits of a key << 32 | its number: as many keys are smaller, or equal and before it. Keys are
-   not negative; room for 16 more is overwritten. */
+enum { RANKED_MOST = 320 };
+
+/* out[place] = bits of a key << 32 | its number, of RANKED_MOST keys at most: as many keys are smaller, or
+   equal and before it. Keys are not negative; room for 16 more is overwritten. Two sixteens are compared
+   once: what is not larger than a later key stands before it. */
 static void rank_rows(float *key, size_t count, uint64_t *out)
 {
     const vfloat16 zero = vfloat16_set1(0);
+    uint32_t earlier[RANKED_MOST + 16] = {0}; /* sixteens before its own: how many of them come first */
     for (size_t i = count; i < count + 16; i++)
         key[i] = INFINITY;
     for (size_t first = 0; first < count; first += 16) {
         _Alignas(64) float place[16];
         const vfloat16 mine = vfloat16_load(key + first);
         vfloat16 before[4] = {zero, zero, zero, zero};
-        for (size_t i = 0; i < first; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_le(vfloat16_set1(key[i + k]), mine), before[k]);
-        for (size_t i = first + 16; i < count; i += 4)
-            for (int k = 0; k < 4; k++)
-                before[k] = count_where(vfloat16_lt(vfloat16_set1(key[i + k]), mine), before[k]);
         for (size_t i = 0; i < 16; i += 4)
             for (int k = 0; k < 4; k++) {
                 const vfloat16 other = vfloat16_set1(key[first + i + k]);
@@ -276,12 +274,18 @@ static void rank_rows(float *key, size_t count, uint64_t *out)
                     vmask16_or(vfloat16_lt(other, mine), vmask16_and(vfloat16_le(other, mine), later)),
                     before[k]);
             }
+        for (size_t i = first + 16; i < count; i += 4)
+            for (int k = 0; k < 4; k++) {
+                const vmask16 smaller_key = vfloat16_lt(vfloat16_set1(key[i + k]), mine);
+                before[k] = count_where(smaller_key, before[k]);
+                earlier[i + k] += 16 - (uint32_t)__builtin_popcount(vmask16_bits(smaller_key));
+            }
         vfloat16_store(place,
                        vfloat16_add(vfloat16_add(before[0], before[1]), vfloat16_add(before[2], before[3])));
         for (size_t i = first; i < first + 16 && i < count; i++) {
             uint32_t bits;
             memcpy(&bits, &key[i], sizeof bits);
-            out[(size_t)place[i - first]] = (uint64_t)bits << 32 | i;
+            out[(size_t)place[i - first] + earlier[i]] = (uint64_t)bits << 32 | i;
         }
     }
 }

@@ -51,9 +51,36 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
     return true;
 }
 
+/* As insert_row(), of row i of the order: how far it goes back is known, so that no branch waits for what it
+   meets there. Rows in front of which it has a hit of a ray that they have, too, go on past it later. */
+static inline void insert_again(const packet_hits *rows, insertion *s, const tape_entry *entry, int i,
+                                vfloat16 t, vfloat16 alpha)
+{
+    const int back = entry[i].packet >> TAPE_BACK, first = i - (back > 2 ? back : 2);
+    near_row now = {.t = t, .alpha = alpha, .term = vfloat16_set1(0)};
+    vfloat16 product = vfloat16_set1(1);
+    row_store(rows->before, i, s->before);
+    rows->kept[i] = (uint32_t)i + 2;
+    pass_row(&now, &s->last, &product);
+    pass_row(&now, &s->second, &product);
+    s->crowded = s->crowded || back == TAPE_SORTED;
+    for (int j = i - 3; j >= first && !s->crowded; j--) {
+        const vmask16 front = vfloat16_lt(t, row_load(rows->t, j));
+        row_store(rows->T_front, j, vfloat16_less_where(front, row_load(rows->T_front, j), alpha));
+        product = vfloat16_less_unless(front, product, row_load(rows->alpha, j));
+        const unsigned met = vmask16_bits(front) & entry[i].lanes & entry[j].lanes;
+        rows->kept[j] = met ? (uint32_t)i : rows->kept[j];
+    }
+    now.value = vfloat16_mul(row_load(rows->before, s->crowded ? i : first), product);
+    row_store(rows->T_front, i - 2, s->second.value);
+    s->second = s->last;
+    s->last = now;
+    s->before = vfloat16_fnma(s->before, alpha, s->before);
+}
+
 /* Evaluate the rows of a packet again, in the order of the tape, and find T of all of them. */
-static void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
-                        packet_hits *out)
+static PASS void replay_list(const packet_pass *p, const used_list *used, const tape_entry *entry,
+                             size_t count, packet_hits *out)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -83,7 +110,7 @@ static void replay_list(const packet_pass *p, const used_list *used, const tape_
             rows.number[i] = number[k];
             row_store(rows.t, i, r[k].t);
             rows.order[i] = (uint32_t)i;
-            insert_row(&rows, &s, i, r[k].t, alpha);
+            insert_again(&rows, &s, entry, i, r[k].t, alpha);
         }
     }
     end_insertion(out, &s);
@@ -97,67 +124,50 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
     *sum = vfloat16_add_unless(behind, *sum, other->term);
 }
 
-/* Row i goes on past row j and those after it, too; returned is what lies behind it from there on. */
-static inline __attribute__((always_inline)) vfloat16 step_on(const packet_hits *rows, const near_row *now,
-                                                              vmask16 hit, int j, size_t *steps)
-{
-    vfloat16 sum = vfloat16_set1(0);
-    const int from = j;
-    do {
-        const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now->t);
-        sum = vfloat16_add_unless(behind, sum, row_load(rows->term, j));
-        row_store(rows->behind, j, vfloat16_add_where(behind, row_load(rows->behind, j), now->term));
-        j++;
-    } while (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, j), now->t), hit)));
-    *steps += (size_t)(j - from);
-    return vfloat16_add(row_load(rows->before, j), sum);
-}
-
 /* What lies behind every hit, with the background: from the last row to the first, as T was found from the
-   first to the last. `before` and `reached` are used again: sum of the terms of a row and those after it,
-   their nearest hits. Only sums of what has been added, so nothing cancels. False when it takes too many
-   steps: `term` and `behind` are then to be found ray by ray. */
-static bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
-                           vfloat16 background)
+   first to the last. `before` is used again: sum of the terms of a row and those after it. Only sums of what
+   has been added, so nothing cancels. False when it takes too many steps: `term` and `behind` are then to be
+   found ray by ray. */
+static PASS bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
+                                vfloat16 background)
 {
     const packet_hits copy = *out, *const rows = &copy; /* what stores cannot change */
-    const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
+    const vfloat16 zero = vfloat16_set1(0);
     const tile_gaussian *used_gaussian = used->gaussian;
     const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
     const int count = (int)rows->count;
-    near_row next = {infinite, zero, zero, zero}, second = next;
-    vfloat16 after = background, nearest = infinite;
-    out->steps = 0;
-    for (int i = count; i < count + 3; i++) {
+    near_row next = {vfloat16_set1(INFINITY), zero, zero, zero}, second = next;
+    vfloat16 after = background;
+    size_t steps = 0;
+    for (int i = count; i < count + 3; i++)
         row_store(rows->before, i, background);
-        row_store(rows->reached, i, infinite);
-    }
     for (int i = count; i-- > 0;) {
-        const vfloat16 alpha = row_load(rows->alpha, i);
+        const int last = (int)rows->kept[i];
         near_row now = {.t = row_load(rows->t, i), .alpha = zero};
-        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), alpha),
+        now.term = vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), row_load(rows->alpha, i)),
                                 dot_lanes(used_gaussian[rows->number[i]].color, direction));
-        const vmask16 hit = vfloat16_lt(zero, alpha);
         vfloat16 sum = zero;
         row_store(rows->term, i, now.term);
         pass_on(&now, &next, &sum);
         pass_on(&now, &second, &sum);
-        now.value = vfloat16_add(row_load(rows->before, i + 3), sum);
-        if (vmask16_any(vmask16_and(vfloat16_lt(row_load(rows->reached, i + 3), now.t), hit))) {
-            now.value = vfloat16_add(step_on(rows, &now, hit, i + 3, &out->steps), sum);
-            if (out->steps > STEPS_PER_ROW * (size_t)(count - i) + STEPS_FREE)
-                return false;
+        steps += (size_t)(last - (i + 2));
+        if (steps > STEPS_PER_ROW * (size_t)(count - i) + STEPS_FREE)
+            return false;
+        for (int j = i + 3; j <= last; j++) {
+            const vmask16 behind = vfloat16_lt(row_load(rows->t, j), now.t);
+            sum = vfloat16_add_unless(behind, sum, row_load(rows->term, j));
+            row_store(rows->behind, j, vfloat16_add_where(behind, row_load(rows->behind, j), now.term));
         }
+        now.value = vfloat16_add(row_load(rows->before, last + 1), sum);
         row_store(rows->behind, i + 2, second.value);
         second = next;
         next = now;
         after = vfloat16_add(after, now.term);
-        nearest = vfloat16_min(nearest, vfloat16_select(hit, now.t, infinite));
         row_store(rows->before, i, after);
-        row_store(rows->reached, i, nearest);
     }
     row_store(rows->behind, 1, second.value);
     row_store(rows->behind, 0, next.value);
+    out->steps = steps;
     return true;
 }
 
@@ -201,23 +211,26 @@ static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_
     *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
-/* The sums of a row over the rays, to those of its Gaussian. */
+/* The sums of a row over the rays, to those of its Gaussian. Products of lanes eight apart are added as they
+   are multiplied. */
 static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], const vfloat16 d_rgb[3],
                             float *to)
 {
-    vfloat16 terms[16], hv[3];
-    terms[SLOT_H] = h;
+    vfloat8 terms[16];
+    vfloat16 hv[3];
+    terms[SLOT_H] = vfloat16_fold(h);
     for (int k = 0; k < 3; k++) {
-        terms[SLOT_HV + k] = hv[k] = vfloat16_mul(h, v[k]);
-        terms[SLOT_HVV + k] = vfloat16_mul(hv[k], v[k]);
-        terms[SLOT_COLOR + k] = vfloat16_mul(weight, d_rgb[k]);
+        hv[k] = vfloat16_mul(h, v[k]);
+        terms[SLOT_HV + k] = vfloat16_fold(hv[k]);
+        terms[SLOT_HVV + k] = vfloat16_fold_product(hv[k], v[k]);
+        terms[SLOT_COLOR + k] = vfloat16_fold_product(weight, d_rgb[k]);
     }
-    terms[SLOT_HVV + 3] = vfloat16_mul(hv[1], v[2]);
-    terms[SLOT_HVV + 4] = vfloat16_mul(hv[2], v[0]);
-    terms[SLOT_HVV + 5] = vfloat16_mul(hv[0], v[1]);
-    terms[SLOT_WEIGHT] = weight;
-    terms[14] = terms[15] = vfloat16_set1(0);
-    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat16_sum_rows(terms)));
+    terms[SLOT_HVV + 3] = vfloat16_fold_product(hv[1], v[2]);
+    terms[SLOT_HVV + 4] = vfloat16_fold_product(hv[2], v[0]);
+    terms[SLOT_HVV + 5] = vfloat16_fold_product(hv[0], v[1]);
+    terms[SLOT_WEIGHT] = vfloat16_fold(weight);
+    terms[14] = terms[15] = vfloat16_fold(vfloat16_set1(0));
+    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat8_sum_rows(terms)));
 }
 
 /* Those of a row that the form does not hold for. */
@@ -238,8 +251,8 @@ static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint
 
 /* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
    (turn_sums). */
-static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
-                     const packet_hits *from, gradient_slot *sums)
+static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
+                          const packet_hits *from, gradient_slot *sums)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -284,8 +297,9 @@ static void sum_rows(const packet_pass *p, const used_list *used, const vfloat16
 /* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
    all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
  */
-static void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry, size_t count,
-                         vfloat16 T, vfloat16 behind, const vfloat16 direction[3], gradient_slot *sums)
+static PASS void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry,
+                              size_t count, vfloat16 T, vfloat16 behind, const vfloat16 direction[3],
+                              gradient_slot *sums)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -376,7 +390,7 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
         packet_pass pass;
         if (rays->packet[i].active == 0)
             continue;
-        while (at < tape->count && tape->entries[at].packet == i)
+        while (at < tape->count && (tape->entries[at].packet & (TILE_PACKETS - 1)) == i)
             at++;
         start_pass(scene, part_frame(view, part), rays, i, middle, &pass);
         if (!adjoint_of_packet(&pass, &used, tape, from, at - from, d_rgb[i], &rows, scratch))

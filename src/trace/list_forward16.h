@@ -15,9 +15,8 @@ typedef struct row_queue {
 
 /* What the rays of a packet still see. */
 typedef struct ray_limits {
-    vfloat16 far;  /* hits at this depth or behind are not seen */
-    vfloat16 near; /* of parts of rays: nor are hits nearer than this */
-    bool parts;
+    vfloat16 far;     /* hits at this depth or behind are not seen */
+    vfloat16 near;    /* nor are hits nearer than this; 0 but for parts of rays */
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
 } ray_limits;
@@ -28,9 +27,8 @@ static inline void append_response(const packet_hits *rows, size_t *count, const
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
-    vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), vfloat16_lt(r.t, limits->far));
-    if (limits->parts)
-        hit = vmask16_and(hit, vfloat16_le(limits->near, r.t));
+    const vmask16 seen = vmask16_and(vfloat16_lt(r.t, limits->far), vfloat16_le(limits->near, r.t)),
+                  hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), seen);
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
@@ -67,8 +65,8 @@ static void evaluate_queue(const packet_pass *p, const tile_list *list, const ro
 }
 
 /* All rows that can be seen. */
-static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
-                        kernel_counters *counters)
+static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
+                             kernel_counters *counters)
 {
     const packet_rays *rays = p->rays;
     const bool parts = p->parts;
@@ -79,7 +77,6 @@ static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits
     ray_limits limits = {.far =
                              vfloat16_select(vmask16_from_bits(rays->active), vfloat16_load(rays->far), zero),
                          .near = parts ? vfloat16_load(rays->near) : zero,
-                         .parts = parts,
                          .product = parts ? vfloat16_load(rays->T_front) : vfloat16_set1(1),
                          .reached = zero};
     row_queue queue = {.count = 0};
@@ -108,8 +105,24 @@ static void gather_rows(const packet_pass *p, const tile_list *list, packet_hits
     }
 }
 
-static bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
-                       packet_output *out, hit_tape *tape, kernel_counters *counters)
+/* How far rows go back, into the entries `begin` to `end` of a packet. A row that has none writes into that
+   of the next one, which may go back farther than it has to. */
+static void note_back(const packet_hits *rows, tape_entry *entries, size_t begin, size_t end)
+{
+    for (size_t k = 0; k < rows->back_count; k++) {
+        const uint32_t at = rows->kept[rows->back[k].place];
+        if (at == end)
+            break;
+        const uint32_t past = at - rows->kept[rows->back[k].place - rows->back[k].past];
+        const uint32_t told = past < TAPE_SORTED ? past : TAPE_SORTED;
+        entries[at].packet = (uint16_t)((entries[at].packet & (TILE_PACKETS - 1)) | told << TAPE_BACK);
+    }
+    for (size_t k = begin; k < end && rows->crowded; k++)
+        entries[k].packet |= TAPE_SORTED << TAPE_BACK;
+}
+
+static PASS bool blend_list(const packet_pass *p, const tile_list *list, const packet_hits *from,
+                            packet_output *out, hit_tape *tape, kernel_counters *counters)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
@@ -150,12 +163,15 @@ static bool blend_list(const packet_pass *p, const tile_list *list, const packet
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
+            rows->kept[i] = (uint32_t)kept;
             entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
             kept += bits != 0;
         }
     }
-    if (tape != NULL)
+    if (tape != NULL) {
+        note_back(from, tape->entries, tape->count, kept);
         tape->count = kept;
+    }
     if (tape != NULL && one_order)
         vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
     counters->hits += hits;

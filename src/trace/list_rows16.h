@@ -15,8 +15,16 @@
 #include "trace/ray_hits.h"
 #include "trace/row16.h"
 
+/* The passes over a packet: each has the registers to itself. */
+#define PASS __attribute__((noinline))
+
 /* Steps back, or on, that a packet is allowed per row before its rays are sorted one by one. */
 enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };
+
+/* A row's place, and how many rows it goes back past. */
+typedef struct row_back {
+    uint32_t place, past;
+} row_back;
 
 /* The hits of a packet: arrays of rows, PACKET_LANES floats each; sixteen more than `count` have memory. */
 typedef struct packet_hits {
@@ -25,10 +33,14 @@ typedef struct packet_hits {
     /* By place in the order: */
     float *T_front; /* T in front of the hit, from 1 on; two more stand before the first */
     float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
-    float *reached; /* farthest hit of all rows before this one; two more, too */
+    float *reached; /* not adjoint: farthest hit of all rows before this one; two more, too */
     /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
        row, 1 / den of its response. */
     float *term, *behind, *inverse;
+    uint32_t *kept; /* by place: entries of the tape in front of it; adjoint: the last place that it goes on
+                       past */
+    row_back *back; /* not adjoint: of rows that go back past more than two, in their order */
+    size_t back_count;
     uint32_t *order;  /* row */
     uint32_t *number; /* of a row, in the tile's list */
     float *key;       /* depth on a ray in the middle */
@@ -41,22 +53,27 @@ typedef struct packet_hits {
 static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, packet_hits *out)
 {
     /* Arrays 4096 bytes apart would compete for the same lines of the cache. */
-    const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 8 : 5;
-    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 3 * (n + 9),
+    const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 7 : 5;
+    if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 6 * (n + 9),
                     sizeof(float), "rows of a packet", NULL) != GBT_OK)
         return false;
-    float **field[8] = {&out->t,       &out->alpha, &out->T_front, &out->before,
-                        &out->reached, &out->term,  &out->behind,  &out->inverse};
+    float **field[7] = {
+        &out->t,      &out->alpha,  &out->T_front, &out->before, adjoint ? &out->term : &out->reached,
+        &out->behind, &out->inverse};
     float *at = scratch->rows;
     for (size_t k = 0; k < arrays; k++, at += wide)
         *field[k] = at;
     out->T_front += 2 * PACKET_LANES;
     out->before += 2 * PACKET_LANES;
-    out->reached += 2 * PACKET_LANES;
+    if (!adjoint)
+        out->reached += 2 * PACKET_LANES;
     out->key = at;
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
     out->number = word + n;
+    out->kept = word + 2 * n;
+    out->back = (row_back *)(void *)(word + 3 * n);
+    out->back_count = 0;
     out->steps = 0; /* so they stay in one order for all rays */
     out->crowded = false;
     return true;
@@ -259,7 +276,7 @@ typedef struct insertion {
     near_row last, second;
     vfloat16 before;  /* product of 1 - alpha over all of them */
     vfloat16 reached; /* farthest hit of them */
-    size_t steps;
+    size_t steps, back_count;
     bool crowded;
 } insertion;
 
@@ -267,11 +284,9 @@ static inline insertion start_insertion(const packet_hits *rows)
 {
     const vfloat16 zero = vfloat16_set1(0), one = vfloat16_set1(1);
     const near_row none = {zero, zero, zero, one};
-    for (int i = -2; i < 0; i++) {
+    for (int i = -2; i < 0; i++)
         row_store(rows->before, i, one);
-        row_store(rows->reached, i, zero);
-    }
-    return (insertion){none, none, one, zero, 0, false};
+    return (insertion){none, none, one, zero, 0, 0, false};
 }
 
 /* Row i of the order: T in front of its hits, and in front of those that they hide. Each goes back past the
@@ -289,7 +304,9 @@ static inline void insert_row(const packet_hits *rows, insertion *s, int i, vflo
     pass_row(&now, &s->second, &product);
     now.value = vfloat16_mul(row_load(rows->before, i - 2), product);
     if (vmask16_any(vmask16_and(vfloat16_lt(now.t, row_load(rows->reached, i - 2)), hit)) && !s->crowded) {
+        const size_t steps = s->steps;
         now.value = vfloat16_mul(step_back(rows, &now, hit, i - 2, &s->steps), product);
+        rows->back[s->back_count++] = (row_back){(uint32_t)i, (uint32_t)(s->steps - steps) + 2};
         s->crowded = s->steps > STEPS_PER_ROW * (size_t)i + STEPS_FREE;
     }
     row_store(rows->T_front, i - 2, s->second.value);
@@ -306,13 +323,16 @@ static inline void end_insertion(packet_hits *out, const insertion *s)
     row_store(out->T_front, end - 1, s->last.value);
     out->product = s->before;
     out->steps = s->steps;
+    out->back_count = s->back_count;
     out->crowded = s->crowded;
 }
 
-static void insert_rows(packet_hits *out)
+static PASS void insert_rows(packet_hits *out)
 {
     const packet_hits rows = *out;
     insertion s = start_insertion(&rows);
+    for (int i = -2; i < 0; i++)
+        row_store(rows.reached, i, vfloat16_set1(0));
     for (int i = 0; i < (int)rows.count; i++) {
         const int row = (int)rows.order[i];
         insert_row(&rows, &s, i, row_load(rows.t, row), row_load(rows.alpha, row));

@@ -78,6 +78,15 @@ static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *o
 static inline int vmask16_any(vmask16 m) { return vmask16_bits(m) != 0; }
 #endif
 
+/** out[j] = the sum of in[j], j = 0..15, in a fixed order: lanes eight apart first. */
+static inline vfloat16 vfloat16_sum_rows(const vfloat16 in[16])
+{
+    vfloat8 half[16];
+    for (int j = 0; j < 16; j++)
+        half[j] = vfloat16_fold(in[j]);
+    return vfloat8_sum_rows(half);
+}
+
 /** The smallest x of vfloat16_exp2(). 2^-120 of an opacity is far below the least alpha_min that can be set,
     1e-30. */
 #define EXP2_LEAST (-120.0f)

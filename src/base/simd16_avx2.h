@@ -144,7 +144,6 @@ static inline vmask16 vmask16_from_bits(unsigned bits)
     {                                                                                                        \
         return (vfloat16){name##_eight(in), name##_eight(in + 8)};                                           \
     }
-VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm256_add_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm256_min_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm256_max_ps)
 #undef VFLOAT16_REDUCE_ROWS

@@ -110,7 +110,6 @@ static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *o
         const __m512d a = _mm512_castps_pd(z[0]), b = _mm512_castps_pd(z[1]);                                \
         return op(_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b)));   \
     }
-VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, _mm512_add_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, _mm512_min_ps)
 VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, _mm512_max_ps)
 #undef VFLOAT16_REDUCE_ROWS

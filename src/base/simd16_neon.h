@@ -137,14 +137,16 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
     return vreinterpretq_f32_f64(vzip2q_f64(vreinterpretq_f64_f32(x), vreinterpretq_f64_f32(y)));
 }
 
-#define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
-    static inline float32x4_t name##_lanes(vfloat16 x) { return op(op(x.a, x.c), op(x.b, x.d)); }            \
+#define VFLOAT16_TURN_ROWS(name, op)                                                                         \
     static inline float32x4_t name##_turned(float32x4_t x, float32x4_t y, float32x4_t z, float32x4_t w)      \
     {                                                                                                        \
         const float32x4_t xy = op(lower_halves(x, y), upper_halves(x, y));                                   \
         const float32x4_t zw = op(lower_halves(z, w), upper_halves(z, w));                                   \
         return op(vuzp1q_f32(xy, zw), vuzp2q_f32(xy, zw));                                                   \
-    }                                                                                                        \
+    }
+#define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
+    VFLOAT16_TURN_ROWS(name, op)                                                                             \
+    static inline float32x4_t name##_lanes(vfloat16 x) { return op(op(x.a, x.c), op(x.b, x.d)); }            \
     static inline float32x4_t name##_four(const vfloat16 *in)                                                \
     {                                                                                                        \
         return name##_turned(name##_lanes(in[0]), name##_lanes(in[1]), name##_lanes(in[2]),                  \
@@ -154,10 +156,11 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
     {                                                                                                        \
         return (vfloat16){name##_four(in), name##_four(in + 4), name##_four(in + 8), name##_four(in + 12)};  \
     }
-VFLOAT16_REDUCE_ROWS(vfloat16_sum_rows, vaddq_f32)
+VFLOAT16_TURN_ROWS(sum, vaddq_f32)
 VFLOAT16_REDUCE_ROWS(vfloat16_min_rows, lesser4)
 VFLOAT16_REDUCE_ROWS(vfloat16_max_rows, greater4)
 #undef VFLOAT16_REDUCE_ROWS
+#undef VFLOAT16_TURN_ROWS
 #undef VFLOAT16_PAIRS
 #undef VFLOAT16_EACH
 
@@ -174,8 +177,8 @@ static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
 }
 static inline float32x4_t sum4_rows(const vfloat8 *in)
 {
-    return vfloat16_sum_rows_turned(vaddq_f32(in[0].a, in[0].b), vaddq_f32(in[1].a, in[1].b),
-                                    vaddq_f32(in[2].a, in[2].b), vaddq_f32(in[3].a, in[3].b));
+    return sum_turned(vaddq_f32(in[0].a, in[0].b), vaddq_f32(in[1].a, in[1].b), vaddq_f32(in[2].a, in[2].b),
+                      vaddq_f32(in[3].a, in[3].b));
 }
 static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 {

@@ -123,22 +123,7 @@ static inline vmask16 vmask16_or(vmask16 a, vmask16 b) { return (vmask16){a.bits
 static inline vmask16 vmask16_andnot(vmask16 a, vmask16 b) { return (vmask16){b.bits & ~a.bits}; }
 static inline unsigned vmask16_bits(vmask16 m) { return m.bits; }
 static inline vmask16 vmask16_from_bits(unsigned bits) { return (vmask16){bits & 0xFFFF}; }
-/* out[j] = all lanes of in[j] combined, j = 0..15, in a fixed order: lanes eight apart, then four apart, then
-   two, then the last two. */
-static inline vfloat16 vfloat16_sum_rows(const vfloat16 in[16])
-{
-    vfloat16 out;
-    EACH
-    {
-        const float *e = in[i].v;
-        float four[4];
-        for (int k = 0; k < 4; k++)
-            four[k] = (e[k] + e[k + 8]) + (e[k + 4] + e[k + 12]);
-        out.v[i] = (four[0] + four[2]) + (four[1] + four[3]);
-    }
-    return out;
-}
-/* The first step of that by itself, of x and of x y, and the others. */
+/* Sums of x and of x y of lanes eight apart. */
 typedef struct vfloat8 {
     float v[8];
 } vfloat8;
@@ -156,6 +141,7 @@ static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
         r.v[i] = fmaf(x.v[i + 8], y.v[i + 8], x.v[i] * y.v[i]);
     return r;
 }
+/* out[j] = the sum of in[j], j = 0..15, in a fixed order: lanes four apart, then two, then the last two. */
 static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 {
     vfloat16 out;

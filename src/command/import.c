@@ -63,9 +63,7 @@ static gbt_status find_downscale(const result_folder *from, const char *data, do
                      from->width, why.text);
         return GBT_OK;
     }
-    const gbt_status status = from->width > 0 ? photos_downscale_to(&s, from->width, out, err)
-                                              : photos_usual_downscale(&s, true, out, err);
-    *out = fmax(*out, from->reduced);
+    const gbt_status status = photos_result_downscale(&s, from->width, from->reduced, out, err);
     scene_free(&s);
     return status;
 }

@@ -176,12 +176,8 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     if (downscale <= 0)
         downscale = out->def.downscale;
-    if (downscale <= 0 && out->picture_width > 0)
-        GBT_TRY(photos_downscale_to(&out->scene, out->picture_width, &downscale, err));
-    if (downscale <= 0) { /* Gaussians of others, whose file says nothing */
-        GBT_TRY(photos_usual_downscale(&out->scene, true, &downscale, err));
-        downscale = fmax(downscale, out->reduced);
-    }
+    if (downscale <= 0) /* Gaussians of others */
+        GBT_TRY(photos_result_downscale(&out->scene, out->picture_width, out->reduced, &downscale, err));
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
 

@@ -55,6 +55,13 @@ gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *dow
     return photos_downscale_to(s, limits_width ? USUAL_WIDTH : HUGE_VAL, downscale, err);
 }
 
+gbt_status photos_result_downscale(const scene *s, int width, int reduced, double *downscale, gbt_error *err)
+{
+    GBT_TRY(photos_downscale_to(s, width > 0 ? width : USUAL_WIDTH, downscale, err));
+    *downscale = fmax(*downscale, reduced);
+    return GBT_OK;
+}
+
 /* One `part`-th of the memory that is free. Nothing but time depends on it. */
 static size_t free_share(size_t part)
 {

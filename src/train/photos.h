@@ -49,6 +49,10 @@ gbt_status photos_downscale_to(const scene *s, double width, double *downscale, 
 /** The same where nobody says a width: 1,600 pixels if `limits_width`, else as wide as it is. */
 gbt_status photos_usual_downscale(const scene *s, bool limits_width, double *downscale, gbt_error *err);
 
+/** The same of a 3DGS result folder that says no downscale (data/result_folder.h): to `width`, else, where it
+    is 0, to 1,600 pixels if they are wider; but by no less than `reduced`. */
+gbt_status photos_result_downscale(const scene *s, int width, int reduced, double *downscale, gbt_error *err);
+
 /** `downscale` 0 is 1. */
 gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_error *err);
 void photos_close(photos *p);

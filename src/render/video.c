@@ -15,9 +15,10 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "base/large_file.h"
 #include "base/memory.h"
 
-enum { PATH_LIMIT = 4096, ARGUMENTS_MAX = 48 };
+enum { ARGUMENTS_MAX = 48 };
 
 /* By itself ffmpeg converts by BT.601 and does not say so in the file; players take that for BT.709. */
 #define AS_BT709                                                                                             \
@@ -41,7 +42,7 @@ static const struct {
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
 struct video {
-    char path[PATH_LIMIT], part[PATH_LIMIT];
+    large_file film; /* ffmpeg writes it, by its name */
     int width, height;
     int pictures;       /* socket to ffmpeg; -1: closed */
     FILE *complaints;   /* what ffmpeg says */
@@ -83,7 +84,7 @@ static gbt_status missing(const video *v, gbt_error *err)
         err, GBT_ERR_IO,
         "%s: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, "
         "or give a folder for pictures)",
-        v->path);
+        v->film.name);
 }
 
 /** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when
@@ -92,7 +93,7 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
 {
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
-        return base_fail(err, GBT_ERR_IO, "%s: no socket: %s", v->path, strerror(errno));
+        return base_fail(err, GBT_ERR_IO, "%s: no socket: %s", v->film.name, strerror(errno));
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
@@ -107,14 +108,12 @@ static gbt_status start(video *v, char *const *arguments, gbt_error *err)
     v->process = 0;
     if (code == ENOENT)
         return missing(v, err);
-    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->path, strerror(code));
+    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg does not start: %s", v->film.name, strerror(code));
 }
 
 static gbt_status prepare(video *v, const char *path, int width, int height, double fps, gbt_error *err)
 {
     const int kind = kind_of(path);
-    const char *slash = strrchr(path, '/');
-    const int folder = slash != NULL ? (int)(slash - path) + 1 : 0;
     if (kind == KINDS)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)",
                          path);
@@ -131,11 +130,7 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: SIGCHLD is ignored, so that nobody knows how ffmpeg ends (wanted SIG_DFL)",
                          path);
-    /* ./: a name that begins with a dash is no option, and what stands before a colon no protocol. */
-    if (snprintf(v->path, sizeof v->path, "%s", path) >= (int)sizeof v->path ||
-        snprintf(v->part, sizeof v->part, "%s%.*s.%s.tmp", path[0] == '/' ? "" : "./", folder, path,
-                 path + folder) >= (int)sizeof v->part)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", path);
+    GBT_TRY(large_file_create(path, &v->film, err));
     v->width = width;
     v->height = height;
     v->row = mem_alloc((size_t)width * (size_t)height, 3, "film", err);
@@ -144,7 +139,10 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return GBT_ERR_NO_MEMORY;
     if (v->complaints == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: no temporary file: %s", path, strerror(errno));
-    char size[32], rate[32];
+    const char *made = v->film.temporary[0] != '\0' ? v->film.temporary : path; /* streams have none */
+    char name[LARGE_FILE_NAME + 2], size[32], rate[32];
+    /* ./: a name that begins with a dash is no option, and what stands before a colon no protocol. */
+    snprintf(name, sizeof name, "%s%s", made[0] == '/' ? "" : "./", made);
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", fps);
     const char *head[] = {"ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y",
@@ -156,7 +154,7 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         arguments[count++] = (char *)head[i];
     for (size_t i = 0; kinds[kind].options[i] != NULL; i++)
         arguments[count++] = (char *)kinds[kind].options[i];
-    arguments[count++] = v->part;
+    arguments[count++] = name;
     arguments[count] = NULL;
     return start(v, arguments, err);
 }
@@ -207,13 +205,13 @@ static gbt_status failed(video *v, int code, gbt_error *err)
         if (line[0] != '\0')
             memcpy(last, line, sizeof last);
     }
-    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg failed (code %d): %s", v->path, code, last);
+    return base_fail(err, GBT_ERR_IO, "%s: ffmpeg failed (code %d): %s", v->film.name, code, last);
 }
 
 gbt_status video_add(video *v, const image *picture, gbt_error *err)
 {
     if (picture->width != v->width || picture->height != v->height || picture->channels != 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->path,
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a picture of %d x %d (wanted %d x %d)", v->film.name,
                          picture->width, picture->height, v->width, v->height);
     const size_t count = 3 * (size_t)v->width * (size_t)v->height;
     for (size_t i = 0; i < count; i++) {
@@ -238,16 +236,11 @@ gbt_status video_close(video *v, bool keep, gbt_error *err)
     if (!keep && v->process != 0)
         kill(v->process, SIGKILL);
     const int code = finish(v);
-    gbt_status status = GBT_OK;
-    if (keep && code != 0)
-        status = failed(v, code, err);
-    else if (keep && rename(v->part, v->path) != 0)
-        status = base_fail(err, GBT_ERR_IO, "%s: cannot replace: %s", v->path, strerror(errno));
-    if (!keep || status != GBT_OK)
-        unlink(v->part);
+    const gbt_status status = keep && code != 0 ? failed(v, code, err) : GBT_OK,
+                     closed = large_file_close(&v->film, keep && status == GBT_OK, err);
     if (v->complaints != NULL)
         fclose(v->complaints);
     mem_free(v->row);
     mem_free(v);
-    return status;
+    return status == GBT_OK ? closed : status;
 }

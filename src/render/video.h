@@ -22,8 +22,8 @@ typedef struct video video;
  * @param width, height [in] > 0; both even, but for .gif
  * @param fps           [in] > 0; at most 50 for .gif, whose delays are whole 1/100 s
  * @param out           [out] end with video_close(); NULL on failure
- * @return GBT_OK, GBT_ERR_ARGUMENT (an odd size, too many frames a second), GBT_ERR_IO (no ffmpeg),
- *         GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (an odd size, too many frames a second), GBT_ERR_IO (no ffmpeg, no
+ *         file can be made there), GBT_ERR_NO_MEMORY
  */
 gbt_status video_open(const char *path, int width, int height, double fps, video **out, gbt_error *err);
 
@@ -32,8 +32,8 @@ gbt_status video_open(const char *path, int width, int height, double fps, video
 gbt_status video_add(video *v, const image *picture, gbt_error *err);
 
 /**
- * Wait for ffmpeg; with `keep` the film gets its name when all went well, otherwise nothing is left of it.
- * `v` is gone then. NULL is fine.
+ * Wait for ffmpeg; with `keep` the film gets its name when all went well, otherwise nothing is left of it
+ * (large_file_close()). `v` is gone then. NULL is fine.
  */
 gbt_status video_close(video *v, bool keep, gbt_error *err);
 

@@ -757,6 +757,9 @@ static void film_and_back(void **state)
     char command[2048];
     video *v;
     image picture;
+    struct stat info;
+    write_text(path, "old");
+    assert_int_equal(chmod(path, 0600), 0);
     assert_ok(video_open(path, SIDE, SIDE, 10, &v, &assert_ok_err_));
     assert_ok(image_alloc(&picture, SIDE, SIDE, 3, &assert_ok_err_));
     for (int frame = 0; frame < COUNT; frame++) {
@@ -764,8 +767,9 @@ static void film_and_back(void **state)
             picture.pixels[i] = frame + 1 < COUNT ? 0.1f + 0.15f * (float)frame : red[i % 3];
         assert_ok(video_add(v, &picture, &assert_ok_err_));
     }
-    assert_false(file_exists(path)); /* not before it is whole */
+    assert_true(stat(path, &info) == 0 && info.st_size == 3); /* not replaced before it is whole */
     assert_ok(video_close(v, true, &assert_ok_err_));
+    assert_true(stat(path, &info) == 0 && (info.st_mode & 0777) == 0600);
     snprintf(command, sizeof command,
              "ffmpeg -nostdin -loglevel error -y -i %s -vf scale=in_color_matrix=bt709 -f rawvideo "
              "-pix_fmt rgb24 %s",

@@ -57,8 +57,8 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
 }
 
 /* How transparent a stored photo is, at another size; `out` stays empty where nothing is. */
-static gbt_status read_through(const image *stored, gbt_alpha kind, int width, int height, image *out,
-                               gbt_error *err)
+static gbt_status read_transparency(const image *stored, gbt_alpha kind, int width, int height, image *out,
+                                    gbt_error *err)
 {
     if (kind == GBT_ALPHA_MASK || !image_is_transparent(stored))
         return GBT_OK;
@@ -71,9 +71,9 @@ static gbt_status read_through(const image *stored, gbt_alpha kind, int width, i
     return status;
 }
 
-/* `valid` and `through` are optional. */
+/* `valid` and `transparency` are optional. */
 static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid,
-                             image *through, gbt_error *err)
+                             image *transparency, gbt_error *err)
 {
     image stored = {0}, rgb = {0};
     memset(out, 0, sizeof *out);
@@ -92,8 +92,8 @@ static gbt_status read_photo(const scene_view *view, int width, int height, imag
     } else if (status == GBT_OK) {
         status = to_rgb(&stored, view->alpha, premultiplied, &rgb, err);
     }
-    if (status == GBT_OK && through != NULL)
-        status = read_through(&stored, view->alpha, width, height, through, err);
+    if (status == GBT_OK && transparency != NULL)
+        status = read_transparency(&stored, view->alpha, width, height, transparency, err);
     image_free(&stored);
     if (status == GBT_OK && rgb.width == width && rgb.height == height) {
         *out = rgb;
@@ -118,10 +118,10 @@ gbt_status scene_read_photo(const scene_view *view, int width, int height, image
 }
 
 static gbt_status read_whole(const scene_view *view, int width, int height, image *out, unsigned char **valid,
-                             image *through, gbt_error *err)
+                             image *transparency, gbt_error *err)
 {
     *valid = NULL;
-    const gbt_status status = read_photo(view, width, height, out, valid, through, err);
+    const gbt_status status = read_photo(view, width, height, out, valid, transparency, err);
     if (status != GBT_OK) {
         mem_free(*valid);
         *valid = NULL;
@@ -135,12 +135,12 @@ gbt_status scene_read_photo_valid(const scene_view *view, int width, int height,
     return read_whole(view, width, height, out, valid, NULL, err);
 }
 
-gbt_status scene_read_photo_through(const scene_view *view, int width, int height, image *out,
-                                    unsigned char **valid, image *through, gbt_error *err)
+gbt_status scene_read_photo_transparency(const scene_view *view, int width, int height, image *out,
+                                         unsigned char **valid, image *transparency, gbt_error *err)
 {
-    *through = (image){0};
-    const gbt_status status = read_whole(view, width, height, out, valid, through, err);
+    *transparency = (image){0};
+    const gbt_status status = read_whole(view, width, height, out, valid, transparency, err);
     if (status != GBT_OK)
-        image_free(through);
+        image_free(transparency);
     return status;
 }

@@ -152,11 +152,11 @@ gbt_status scene_read_photo_valid(const scene_view *view, int width, int height,
 /**
  * scene_read_photo_valid(), and what of the photo's alpha channel lies on a colour.
  *
- * @param through [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are
+ * @param transparency [out] 1 channel, how transparent each pixel is, [0, 1]; no pixels (NULL) when all are
  * opaque, or alpha is a mask; free with image_free()
  */
-gbt_status scene_read_photo_through(const scene_view *view, int width, int height, image *out,
-                                    unsigned char **valid, image *through, gbt_error *err);
+gbt_status scene_read_photo_transparency(const scene_view *view, int width, int height, image *out,
+                                         unsigned char **valid, image *transparency, gbt_error *err);
 
 /** Half the diagonal-like extent of the training cameras: 1.1 * max |c - mean c| (spatial_lr_scale); at least
     a small positive number. */

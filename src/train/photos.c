@@ -201,8 +201,8 @@ static gbt_status read_into(photos *p, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
     image photo, transparency;
-    GBT_TRY(scene_read_photo_through(&p->source->views[view], camera.width, camera.height, &photo,
-                                     &p->full_valid[view], &transparency, err));
+    GBT_TRY(scene_read_photo_transparency(&p->source->views[view], camera.width, camera.height, &photo,
+                                          &p->full_valid[view], &transparency, err));
     gbt_status status = to_bytes(&photo, &p->full[view], err);
     if (status == GBT_OK && transparency.pixels != NULL)
         status = to_bytes(&transparency, &p->transparency[view], err);

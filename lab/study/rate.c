@@ -25,16 +25,11 @@ static gbt_status score_view(loaded_run *r, size_t view, image_scores *scores, g
 {
     GBT_TRY(loaded_run_render(r, view, err));
     image photo = {0};
-    unsigned char *marks = NULL;
     const unsigned char *valid = NULL;
-    gbt_status status = scene_read_photo_valid(&r->scene.views[view], r->frame.rgb.width, r->frame.rgb.height,
-                                               &photo, &marks, err);
-    if (status == GBT_OK)
-        status = frame_valid(&r->frame, marks, &valid, err);
+    gbt_status status = frame_read_photo(&r->frame, &r->scene.views[view], &photo, &valid, err);
     if (status == GBT_OK)
         status = image_score_photo(&r->frame.rgb, &photo, valid, r->def.exposure, NULL, scores, err);
     image_free(&photo);
-    mem_free(marks);
     return status;
 }
 

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/memory.h"
 #include "benchmark/bench_scene.h"
 #include "image/metrics.h"
 #include "study/speed.h"
@@ -41,13 +40,9 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
     image photo = {0}, copy = {0}, rgb = {0};
     trace_scene traced = {0};
     raster_scene splatted = {0};
-    unsigned char *marks = NULL;
     const unsigned char *valid = NULL;
     bool counts = true;
-    gbt_status status =
-        scene_read_photo_valid(&s->run.scene.views[view], camera.width, camera.height, &photo, &marks, err);
-    if (status == GBT_OK)
-        status = frame_valid(&s->run.frame, marks, &valid, err);
+    gbt_status status = frame_read_photo(&s->run.frame, &s->run.scene.views[view], &photo, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&rgb, camera.width, camera.height, 3, err);
     if (status == GBT_OK)
@@ -69,7 +64,6 @@ static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_
     raster_scene_free(&splatted);
     image_free(&photo);
     image_free(&copy);
-    mem_free(marks);
     image_free(&rgb);
     return status;
 }

@@ -226,17 +226,13 @@ static gbt_status compare(exporting *e, gbt_error *err)
     for (size_t i = 0; i < e->view_count; i++) {
         const gbt_camera camera = photos_camera(&e->run.photos, e->views[i], 0);
         image photo = {0};
-        unsigned char *marks = NULL;
         const unsigned char *valid = NULL;
         GBT_TRY(loaded_run_render(&e->run, e->views[i], err));
-        gbt_status status = scene_read_photo_valid(&e->run.scene.views[e->views[i]], camera.width,
-                                                   camera.height, &photo, &marks, err);
-        if (status == GBT_OK)
-            status = frame_valid(&e->run.frame, marks, &valid, err);
+        gbt_status status =
+            frame_read_photo(&e->run.frame, &e->run.scene.views[e->views[i]], &photo, &valid, err);
         if (status == GBT_OK)
             status = compare_view(e, i, &camera, &photo, valid, err);
         image_free(&photo);
-        mem_free(marks);
         GBT_TRY(status);
     }
     e->model_to_photo /= (double)e->photo_count;

@@ -27,12 +27,9 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     loaded_run_view_name(r, index, score->file);
     image photo = {0}, error_map = {0};
     image *render = &r->frame.rgb;
-    unsigned char *marks = NULL;
     const unsigned char *valid = NULL;
     image_scores scores = {0};
-    gbt_status status = scene_read_photo_valid(view, render->width, render->height, &photo, &marks, err);
-    if (status == GBT_OK)
-        status = frame_valid(&r->frame, marks, &valid, err);
+    gbt_status status = frame_read_photo(&r->frame, view, &photo, &valid, err);
     if (status == GBT_OK)
         status = image_alloc(&error_map, render->width, render->height, 1, err);
     if (status == GBT_OK)
@@ -54,7 +51,6 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
     for (int i = 0; i < 3 && status == GBT_OK && folder != NULL; i++)
         status = image_write(paths[i], pictures[i], err);
-    mem_free(marks);
     image_free(&photo);
     image_free(&error_map);
     return status;

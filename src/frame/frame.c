@@ -10,6 +10,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "data/scene.h"
 #include "frame/one_start.h"
 #include "frame/plain.h"
 #include "frame/plain_view.h"
@@ -384,6 +385,14 @@ gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char
     return GBT_OK;
 }
 
+gbt_status frame_read_photo(frame *f, const scene_view *view, image *photo, const unsigned char **valid,
+                            gbt_error *err)
+{
+    mem_free(f->photo_valid);
+    GBT_TRY(scene_read_photo_valid(view, f->rays.width, f->rays.height, photo, &f->photo_valid, err));
+    return frame_valid(f, f->photo_valid, valid, err);
+}
+
 void frame_free(frame *f)
 {
     ray_image_free(&f->rays);
@@ -392,6 +401,7 @@ void frame_free(frame *f)
     mem_free(f->blend_weight);
     mem_free(f->through);
     mem_free(f->valid);
+    mem_free(f->photo_valid);
     gaussians_free(&f->gaussians);
     gaussians_free(&f->wide);
     gaussians_free(&f->d_gaussians);

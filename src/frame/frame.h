@@ -70,7 +70,8 @@ typedef struct frame {
     size_t through_capacity;
     unsigned char *valid; /* of the last frame_valid(), where rays are missing */
     size_t valid_capacity;
-    image rgb; /* the render */
+    unsigned char *photo_valid; /* of the last frame_read_photo(): the photo's own marks, or NULL */
+    image rgb;                  /* the render */
     kernel_counters counters;
     frame_times times;
     double half_fov_tan[2]; /* of the camera */
@@ -162,6 +163,13 @@ gbt_status frame_backward_plain(frame *f, const gaussian_cloud *cloud, const ima
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  */
 gbt_status frame_valid(frame *f, const unsigned char *photo, const unsigned char **out, gbt_error *err);
+
+struct scene_view;
+
+/** scene_read_photo_valid() at the size of the last render, and frame_valid() of its marks. `photo`: for
+    image_free(), after a failure too; `valid`: as there, borrowed until the next call. */
+gbt_status frame_read_photo(frame *f, const struct scene_view *view, image *photo,
+                            const unsigned char **valid, gbt_error *err);
 
 /** f->blend_weight of the last frame_render(keep_tape), and no gradient. */
 gbt_status frame_blend_weights(frame *f, gbt_error *err);

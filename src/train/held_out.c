@@ -5,7 +5,6 @@
 #include <math.h>
 
 #include "base/fail.h"
-#include "base/memory.h"
 #include "base/stop_signal.h"
 #include "train/align.h"
 
@@ -22,15 +21,11 @@ gbt_status held_out_psnr(trainer *t, double *psnr, gbt_error *err)
             status = base_fail(err, GBT_ERR_INTERRUPTED, "stopped while held-out photos were scored");
             break;
         }
-        unsigned char *marks = NULL;
         const unsigned char *valid = NULL;
         const gbt_camera camera = photos_camera(&t->photos, i, 0);
         status = step_view_draw(t, &t->views[0], i, &camera, false, err);
         if (status == GBT_OK)
-            status =
-                scene_read_photo_valid(&t->scene.views[i], camera.width, camera.height, &photo, &marks, err);
-        if (status == GBT_OK)
-            status = frame_valid(&t->views[0].frame, marks, &valid, err);
+            status = frame_read_photo(&t->views[0].frame, &t->scene.views[i], &photo, &valid, err);
         image_scores scores = {0};
         if (status == GBT_OK)
             status = image_score_photo(&t->views[0].frame.rgb, &photo, valid, t->exposures.count > 0, NULL,
@@ -40,7 +35,6 @@ gbt_status held_out_psnr(trainer *t, double *psnr, gbt_error *err)
             count++;
         }
         image_free(&photo);
-        mem_free(marks);
     }
     for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* files are to have no other */
         if (t->scene.views[i].is_test)

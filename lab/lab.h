@@ -177,7 +177,7 @@ gbt_status lab_study_time(const lab_runs_def *def, const char *folder, FILE *out
  * adaptive balls and at as many random points, and with more or less asked of an anchor; anchors, bytes and
  * hits per ray against held-out PSNR, all after the same number of steps.
  *
- * Writes anchors.md, .json and .svg into `folder`, and the tables as Markdown to `out`.
+ * Writes anchors.md and .json into `folder`, and the tables as Markdown to `out`.
  *
  * @return as lab_study_paper()
  * Cost: eight runs per scene and seed. What else runs meanwhile changes nothing but the time.

@@ -8,7 +8,6 @@
 #include "study/runs_stat.h"
 
 enum {
-    ANCHORS_VARIANTS_MAX = 12,
     ANCHORS_VOXELS = 0, /* the two that others are compared with */
     ANCHORS_BALLS = 1,
     ANCHORS_ADAPTIVE = 2
@@ -17,7 +16,6 @@ enum {
 typedef struct anchors_variant {
     const char *name;     /* in tables; of its folder, what is no letter or digit as '-' */
     const char *settings; /* what differs from the default: lines as in a run's `config` */
-    int series;           /* of the chart */
 } anchors_variant;
 
 extern const anchors_variant anchors_variants[];

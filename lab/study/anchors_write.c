@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/anchors_write.c -- the study "anchors" as tables, as data, and as charts. */
+/* study/anchors_write.c -- the study "anchors" as tables and as data. */
 #include <math.h>
 #include <stdio.h>
 
 #include "data/json_out.h"
 #include "study/anchors.h"
-#include "study/chart.h"
 
 enum { PAPER_BYTES_PER_ANCHOR = 316 }; /* 79 floats, as the paper counts */
 
@@ -160,39 +159,4 @@ static json_t *data_of(const void *study)
                      s->def.downscale, "seeds", s->grid.seeds, "rows", rows, "runs", runs);
 }
 
-/* ---- charts ---- */
-
-static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
-{
-    scatter_point points[ANCHORS_VARIANTS_MAX * STUDY_SEEDS_MAX];
-    char title[STUDY_NAME_SIZE + 40];
-    snprintf(title, sizeof title, "%s: held-out PSNR against final anchors", s->grid.names[scene]);
-    scatter_chart chart = {
-        .title = title,
-        .note = "a mark per seed",
-        .x_unit = "final anchors (log)",
-        .y_unit = "held-out PSNR, dB",
-        .apart = ~0u,
-        .points = points,
-        .series = {NULL, "voxels", "the paper's balls", "adaptive balls", "random points"}};
-    for (size_t v = 0; v < anchors_variant_count; v++)
-        for (int seed = 0; seed < s->grid.seeds; seed++) {
-            const study_figures *run = study_grid_at(&s->grid, scene, v, seed);
-            points[chart.point_count++] =
-                (scatter_point){anchors_variants[v].series, run->anchors_final, run->psnr,
-                                seed == 0 ? anchors_variants[v].name : ""};
-        }
-    scatter_draw(out, &chart, top);
-}
-
-static void add_charts(const void *study, text *out)
-{
-    const grid_study *s = study;
-    scatter_begin(out, "PSNR against anchors", "", SCATTER_HEIGHT * (int)s->grid.scene_count);
-    for (size_t scene = 0; scene < s->grid.scene_count; scene++)
-        draw_scene(s, scene, SCATTER_HEIGHT * (int)scene, out);
-    text_add(out, "</svg>\n");
-}
-
-const study_output anchors_output = {
-    .name = "anchors", .tables = add_tables, .charts = add_charts, .data = data_of};
+const study_output anchors_output = {.name = "anchors", .tables = add_tables, .data = data_of};

@@ -31,6 +31,8 @@ gbt_status study_output_save(const study_output *o, const void *study, const cha
     snprintf(name, sizeof name, "%s.json", o->name);
     GBT_TRY(save_data(o, study, folder, name, err));
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        if (texts[i].add == NULL)
+            continue;
         text body = {.err = err};
         texts[i].add(study, &body);
         if (texts[i].add == o->tables && out != NULL && body.status == GBT_OK)

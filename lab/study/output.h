@@ -12,7 +12,7 @@
 typedef struct study_output {
     const char *name;
     void (*tables)(const void *study, text *out); /* NAME.md */
-    void (*charts)(const void *study, text *out); /* NAME.svg */
+    void (*charts)(const void *study, text *out); /* NAME.svg; NULL: none */
     json_t *(*data)(const void *study);           /* NAME.json: an object; `schema` and `study` are added */
 } study_output;
 

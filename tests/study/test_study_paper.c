@@ -670,11 +670,8 @@ static void what_a_scene_needs(void **state)
     const double paper = figure_of(json_array_get(runs, 1), "anchors_initial");
     assert_true(figure_of(json_array_get(runs, 2), "anchors_initial") == floor(paper / 2));
     json_decref(whole);
-    char *page = read_text(in_folder("anchors/anchors.md")),
-         *svg = read_text(in_folder("anchors/anchors.svg"));
+    char *page = read_text(in_folder("anchors/anchors.md"));
     assert_int_equal(count_of(page, "| random points |"), 1);
-    assert_null(strstr(svg, "nan"));
-    mem_free(svg);
     mem_free(page);
 }
 

@@ -24,7 +24,6 @@ trace_settings bench_settings_without_cuts(const trace_settings *settings)
     trace_settings s = *settings;
     s.alpha_min = 1e-12f; /* a million of these change a colour by 1e-6 */
     s.transmittance_min = 0;
-    s.proxy_radius = INFINITY;
     return s;
 }
 

@@ -40,10 +40,6 @@ static const speed_step steps[] = {
     {KNOB_STOP, "0.001", 1e-3f, 0},
     {KNOB_STOP, "0.01", 0.01f, 0},
     {KNOB_STOP, "0.03", 0.03f, 0},
-    {KNOB_RADIUS, "inf", 0, 0},
-    {KNOB_RADIUS, "3", 3, 0},
-    {KNOB_RADIUS, "2.5", 2.5f, 0},
-    {KNOB_RADIUS, "2", 2, 0},
     {KNOB_KERNEL, "embree", 0, TRACE_EMBREE},
     {KNOB_KERNEL, "single", 0, TRACE_SINGLE},
     {KNOB_KERNEL, "tree", 0, TRACE_TREE},
@@ -87,9 +83,6 @@ static void list_rows(const trace_settings *own, bool with_splats, speed_model *
             break;
         case KNOB_STOP:
             row->settings.transmittance_min = row->is_default ? row->settings.transmittance_min : s->number;
-            break;
-        case KNOB_RADIUS:
-            row->settings.proxy_radius = row->is_default ? row->settings.proxy_radius : s->number;
             break;
         case KNOB_KERNEL:
             row->kernel = (trace_kernel)s->choice, row->is_default = row->kernel == TRACE_LIST;
@@ -160,7 +153,6 @@ static gbt_status measure_scene(bench_scene *s, bench_reference *want, const cha
     list_rows(&whole, takes_splats(s), out);
     whole.alpha_min = 1e-6f;
     whole.transmittance_min = 1e-9f;
-    whole.proxy_radius = INFINITY;
     s->settings = whole;
     GBT_TRY(bench_scene_decode(s, err));
     out->gaussians = s->gaussians->count;

@@ -9,13 +9,12 @@
 
 struct bench_scene;
 
-enum { SPEED_WAYS_MAX = 29, SPEED_MODELS_MAX = 16 };
+enum { SPEED_WAYS_MAX = 25, SPEED_MODELS_MAX = 16 };
 
 typedef enum speed_knob {
     KNOB_PRESET,
     KNOB_ALPHA,
     KNOB_STOP,
-    KNOB_RADIUS,
     KNOB_KERNEL,
     KNOB_ISA,
     KNOB_RENDERER,

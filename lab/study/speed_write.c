@@ -17,7 +17,7 @@ static const char y_photo_unit[] = "PSNR to the held-out photos, mean, dB";
 
 static const char *knob_name(speed_knob knob)
 {
-    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min",       "T_min",   "proxy radius",
+    static const char *const names[KNOB_COUNT] = {"preset", "alpha_min",       "T_min",
                                                   "kernel", "instruction set", "renderer"};
     return names[knob];
 }
@@ -57,17 +57,14 @@ static json_t *model_to_json(const speed_model *model)
         const speed_row *r = &model->rows[i];
         json_array_append_new(
             rows,
-            json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:o,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob",
-                      knob_name(r->knob), "value", r->value, "kernel",
-                      r->splats ? "" : bench_kernel_name(r->kernel), "isa", cpu_isa_name(r->isa), "alpha_min",
-                      (double)r->settings.alpha_min, "transmittance_min",
-                      (double)r->settings.transmittance_min, "proxy_radius",
-                      isfinite(r->settings.proxy_radius) ? json_real((double)r->settings.proxy_radius)
-                                                         : json_null(),
-                      "tree_forward_core_us_per_ray", r->picture_us, "forward_core_us_per_ray", r->forward_us,
-                      "forward_adjoint_core_us_per_ray", r->both_us, "blended_per_ray", r->blended,
-                      "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr, "max_error", r->error.max,
-                      "photo_psnr", isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
+            json_pack("{s:s,s:s,s:s,s:s,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:f,s:o}", "knob", knob_name(r->knob),
+                      "value", r->value, "kernel", r->splats ? "" : bench_kernel_name(r->kernel), "isa",
+                      cpu_isa_name(r->isa), "alpha_min", (double)r->settings.alpha_min, "transmittance_min",
+                      (double)r->settings.transmittance_min, "tree_forward_core_us_per_ray", r->picture_us,
+                      "forward_core_us_per_ray", r->forward_us, "forward_adjoint_core_us_per_ray", r->both_us,
+                      "blended_per_ray", r->blended, "row_pairs_per_packet", r->pairs, "psnr", r->error.psnr,
+                      "max_error", r->error.max, "photo_psnr",
+                      isfinite(r->photo_psnr) ? json_real(r->photo_psnr) : json_null()));
     }
     json_t *check = json_pack("{s:s,s:f,s:f,s:b}", "row", "exact: largest error", "limit", promised, "value",
                               kept, "pass", kept <= promised);

@@ -135,8 +135,8 @@ static gbt_status commit(content *c, RTCDevice device, gbt_error *err)
     return bvh_check("bvh", err);
 }
 
-gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radius, float reach,
-                                gaussian_scene *scene, gbt_error *err)
+gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float reach, gaussian_scene *scene,
+                                gbt_error *err)
 {
     scene->box_count = scene->rejected_count = 0;
     scene->coordinate_max = 0;
@@ -151,7 +151,7 @@ gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radiu
             return GBT_ERR_NO_MEMORY;
     }
     content *c = scene->internal;
-    GBT_TRY(proxy_boxes_make(g, alpha_min, radius, reach, &c->boxes, err));
+    GBT_TRY(proxy_boxes_make(g, alpha_min, reach, &c->boxes, err));
     if (c->boxes.count > 0) {
         const gbt_status status = commit(c, device, err);
         if (status != GBT_OK) {

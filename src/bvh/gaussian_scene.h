@@ -26,7 +26,6 @@ typedef struct gaussian_scene {
  * Build (or rebuild) the scene. `g` is not needed afterwards.
  *
  * @param alpha_min  [in] smallest response that counts, (0, 1)
- * @param radius    [in] largest distance that counts, in std-devs, > 0, may be infinite
  * @param reach      [in] largest |coordinate| of any ray origin that will be traced: boxes are padded for it
  * @param scene      [in,out] start from {0}; memory is reused from build to build; free with
  *         gaussian_scene_free()
@@ -35,8 +34,8 @@ typedef struct gaussian_scene {
  * Threads: one build at a time per scene; uses all threads inside. Cost: O(n log n); about 150 bytes per
  * Gaussian, most of it counted by bvh_memory_bytes().
  */
-gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float radius, float reach,
-                                gaussian_scene *scene, gbt_error *err);
+gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float reach, gaussian_scene *scene,
+                                gbt_error *err);
 void gaussian_scene_free(gaussian_scene *scene);
 
 /** The box of Gaussian `id` is crossed by the rays of `lanes` (bit i: ray i), at least one. */

@@ -19,7 +19,7 @@ typedef struct builder {
     RTCBVH bvh;
     proxy_boxes boxes;
     const gaussians *g;
-    float alpha_min, radius;
+    float alpha_min;
     binary_tree binary;
     tree_node *nodes;
     size_t node_count, node_capacity;
@@ -43,7 +43,7 @@ static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t
     const gaussians *g = b->g;
     const float q[4] = {g->quat_w[id], g->quat_x[id], g->quat_y[id], g->quat_z[id]};
     const float s[3] = {g->scale_x[id], g->scale_y[id], g->scale_z[id]};
-    const float square = 1.0001f * fminf(2 * logf(g->opacity[id] / b->alpha_min), b->radius * b->radius);
+    const float square = 1.0001f * (2 * logf(g->opacity[id] / b->alpha_min));
     static const int pair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {1, 2}, {2, 0}, {0, 1}};
     float m[9];
     quat_to_matrix(q, m);
@@ -138,8 +138,8 @@ static gbt_status run_builder(builder *b, void *device, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach,
-                               gaussian_tree *tree, gbt_error *err)
+gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree,
+                               gbt_error *err)
 {
     tree->root = NULL;
     tree->leaves = NULL;
@@ -156,13 +156,12 @@ gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius
             return GBT_ERR_NO_MEMORY;
     }
     builder *b = tree->internal;
-    GBT_TRY(proxy_boxes_make(g, alpha_min, radius, reach, &b->boxes, err));
+    GBT_TRY(proxy_boxes_make(g, alpha_min, reach, &b->boxes, err));
     tree->box_count = b->boxes.count;
     tree->rejected_count = b->boxes.rejected_count;
     tree->coordinate_max = b->boxes.coordinate_max;
     b->g = g;
     b->alpha_min = alpha_min;
-    b->radius = radius;
     if (tree->box_count == 0)
         return GBT_OK;
     GBT_TRY(run_builder(b, device, err));

@@ -2,10 +2,9 @@
 /* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder
    (Wald 2014).
 
-   The proxy of Gaussian i is the ellipsoid at k = min(sqrt(2 ln(opacity / alpha_min)), radius) std-devs: the
-   set where its response reaches alpha_min, cut at the radius. Inner nodes hold the padded tight boxes of
-   these ellipsoids (proxy.h); leaves hold up to 16 of the ellipsoids themselves, k^2 1e-4 larger for
-   rounding.
+   The proxy of Gaussian i is the ellipsoid at k = sqrt(2 ln(opacity / alpha_min)) std-devs: the set where
+   its response reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h);
+   leaves hold up to 16 of the ellipsoids themselves, k^2 1e-4 larger for rounding.
 
    Both are laid out for kernels that test 16 children at once, so their layout is part of the interface. */
 #ifndef GBT_BVH_GAUSSIAN_TREE_H
@@ -56,7 +55,6 @@ typedef struct gaussian_tree {
  * Build (or rebuild) the tree.
  *
  * @param alpha_min  [in] smallest response that counts, (0, 1)
- * @param radius    [in] largest distance that counts, in std-devs, > 0, may be infinite
  * @param reach      [in] largest |coordinate| of any ray origin that will be traced: boxes are padded for it
  * @param tree       [in,out] start from {0}; memory is reused from build to build; free with
  *         gaussian_tree_free()
@@ -65,8 +63,8 @@ typedef struct gaussian_tree {
  * Threads: one build at a time per tree; uses all threads inside; the same tree for every thread count.
  * Cost: O(n log n); about 70 bytes per Gaussian.
  */
-gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float radius, float reach,
-                               gaussian_tree *tree, gbt_error *err);
+gbt_status gaussian_tree_build(const gaussians *g, float alpha_min, float reach, gaussian_tree *tree,
+                               gbt_error *err);
 void gaussian_tree_free(gaussian_tree *tree);
 
 #endif

@@ -20,15 +20,15 @@ enum { BLOCK = 4096 };
 typedef struct box_job {
     const gaussians *g;
     struct RTCBuildPrimitive *out; /* NULL: count only */
-    float alpha_min, radius, pad;
+    float alpha_min, pad;
     uint32_t *block_kept;
     float *block_max;
     uint32_t *block_rejected;
 } box_job;
 
 /* Tight half extents of the proxy: k * sqrt(sum_i (R_ji s_i)^2). False when the Gaussian cannot be seen. */
-static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float radius, float center[3],
-                      float half[3], bool *rejected)
+static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float center[3], float half[3],
+                      bool *rejected)
 {
     *rejected = false;
     const float opacity = g->opacity[i];
@@ -39,7 +39,7 @@ static bool proxy_box(const gaussians *g, size_t i, float alpha_min, float radiu
     center[2] = g->mean_z[i];
     if (opacity <= alpha_min)
         return false;
-    const float k = fminf(sqrtf(2 * logf(opacity / alpha_min)), radius);
+    const float k = sqrtf(2 * logf(opacity / alpha_min));
     float m[9];
     quat_to_matrix(q, m);
     bool fine = isfinite(opacity) && s[0] > 0 && s[1] > 0 && s[2] > 0 && isfinite(g->red[i]) &&
@@ -62,7 +62,7 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         float center[3], half[3];
         bool rejected;
-        if (!proxy_box(job->g, i, job->alpha_min, job->radius, center, half, &rejected)) {
+        if (!proxy_box(job->g, i, job->alpha_min, center, half, &rejected)) {
             rejected_count += rejected;
             continue;
         }
@@ -91,8 +91,8 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach,
-                            proxy_boxes *boxes, gbt_error *err)
+gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float reach, proxy_boxes *boxes,
+                            gbt_error *err)
 {
     boxes->count = boxes->rejected_count = 0;
     boxes->coordinate_max = 0;
@@ -106,7 +106,6 @@ gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, f
         return GBT_ERR_NO_MEMORY;
     box_job job = {.g = g,
                    .alpha_min = alpha_min,
-                   .radius = radius,
                    .block_kept = scratch,
                    .block_rejected = scratch + blocks,
                    .block_max = (float *)(scratch + 2 * blocks)};

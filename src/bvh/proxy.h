@@ -3,8 +3,8 @@
    Gaussians is built from.
 
    The proxy of Gaussian i is the ellipsoid at radius sqrt(2 ln(opacity / alpha_min)) std-devs: exactly the
-   set where its response reaches alpha_min; or at a fixed radius, when that is smaller. Its tight box is
-   padded so that float32 traversal misses nothing. */
+   set where its response reaches alpha_min. Its tight box is padded so that float32 traversal misses
+   nothing. */
 #ifndef GBT_BVH_PROXY_H
 #define GBT_BVH_PROXY_H
 
@@ -26,15 +26,14 @@ typedef struct proxy_boxes {
  * Make (or make again) the boxes of `g`.
  *
  * @param alpha_min [in] smallest response that counts, (0, 1)
- * @param radius    [in] largest distance that counts, in std-devs, > 0, may be infinite
  * @param reach     [in] largest |coordinate| of any ray origin that will be traced: boxes are padded for it
  * @param boxes     [in,out] start from {0}; memory is kept from call to call; free with proxy_boxes_free()
  * @return GBT_OK, GBT_ERR_NO_MEMORY (2^31 Gaussians too); on failure there are 0 boxes
  *
  * Threads: uses all; the same boxes for every thread count. Cost: O(n); 40 bytes per Gaussian.
  */
-gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float radius, float reach,
-                            proxy_boxes *boxes, gbt_error *err);
+gbt_status proxy_boxes_make(const gaussians *g, float alpha_min, float reach, proxy_boxes *boxes,
+                            gbt_error *err);
 void proxy_boxes_free(proxy_boxes *boxes); /* back to {0} */
 
 #endif

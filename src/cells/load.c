@@ -45,7 +45,7 @@ static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, floa
     const float share = g->opacity[i] / d->settings.alpha_min;
     if (!(share >= 1) || !(g->scale_x[i] > 0 && g->scale_y[i] > 0 && g->scale_z[i] > 0))
         return false;
-    const float k = fminf(sqrtf(2 * logf(share)), d->settings.proxy_radius) * 1.01f;
+    const float k = sqrtf(2 * logf(share)) * 1.01f;
     const float sx = k * g->scale_x[i], sy = k * g->scale_y[i], sz = k * g->scale_z[i];
     const float quat[4] = {g->quat_w[i], g->quat_x[i], g->quat_y[i], g->quat_z[i]};
     float m[9];

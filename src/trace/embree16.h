@@ -26,7 +26,7 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
     const response r = respond(&g, v->ray, vfloat16_set1(v->scene->settings.t_near));
     const vfloat16 raw = response_alpha(&g, r.d2);
     const vmask16 hit =
-        vmask16_and(vfloat16_le(alpha_threshold(v->scene, g.opacity), raw), vfloat16_lt(r.t, v->far));
+        vmask16_and(vfloat16_le(vfloat16_set1(v->scene->settings.alpha_min), raw), vfloat16_lt(r.t, v->far));
     _Alignas(64) float t[PACKET_LANES], alpha[PACKET_LANES];
     vfloat16_store(t, r.t),
         vfloat16_store(alpha, vfloat16_min(raw, vfloat16_set1(v->scene->settings.alpha_max)));

@@ -170,13 +170,6 @@ static inline void turn_moments(vfloat16 e[3][3], const vfloat16 v[3], const vfl
     }
 }
 
-/* The smallest alpha that is a hit: alpha_min, or what is left of the opacity at the proxy's radius. */
-static inline vfloat16 alpha_threshold(const kernel_scene *scene, vfloat16 opacity)
-{
-    return vfloat16_max(vfloat16_set1(scene->settings.alpha_min),
-                        vfloat16_mul(opacity, vfloat16_set1(scene->radius_response)));
-}
-
 /* Direction of the shortest axis, world. */
 static inline void shortest_axis(const float *record, float normal[3])
 {

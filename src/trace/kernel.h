@@ -34,7 +34,6 @@ typedef struct kernel_scene {
     float coordinate_max;                /* of boxes and ray origins */
     bool extra; /* all of packet_output is wanted, not only colour and transmittance */
     trace_settings settings;
-    float radius_response; /* exp(-proxy_radius^2 / 2) */
 } kernel_scene;
 
 typedef struct packet_rays {

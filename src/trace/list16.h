@@ -9,7 +9,8 @@
 
 /* A Gaussian as the packets of a tile read it; slopes are from the middle of the tile. */
 typedef struct tile_gaussian {
-    float a, b, q[5], depth, falloff, opacity, threshold, color[3];
+    _Alignas(64) float a;
+    float b, q[5], depth, falloff, opacity, color[3];
     uint32_t id;
     uint32_t pair; /* number in the tile's list; with PAIR_GENERAL */
 } tile_gaussian;
@@ -90,8 +91,8 @@ static inline void tile_middle(const slope_box *box, double middle[2])
         middle[k] = 0.5 * ((double)box->low[k] + (double)box->high[k]);
 }
 
-static inline void read_gaussian(const kernel_scene *scene, const list_record *r, const double middle[2],
-                                 uint32_t pair, tile_gaussian *out)
+static inline void read_gaussian(const list_record *r, const double middle[2], uint32_t pair,
+                                 tile_gaussian *out)
 {
     out->a = (float)(r->a - middle[0]);
     out->b = (float)(r->b - middle[1]);
@@ -99,7 +100,6 @@ static inline void read_gaussian(const kernel_scene *scene, const list_record *r
     out->depth = r->depth;
     out->falloff = r->falloff;
     out->opacity = r->opacity;
-    out->threshold = larger(scene->settings.alpha_min, r->opacity * scene->radius_response);
     memcpy(out->color, r->color, sizeof r->color);
     out->id = record_id(r);
     out->pair = pair | (record_is_general(r) ? PAIR_GENERAL : 0);
@@ -339,7 +339,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
             __builtin_prefetch(&view->shapes[pair[8].record]);
         }
         m.shape[i] = view->shapes[pair->record];
-        read_gaussian(scene, &view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
+        read_gaussian(&view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
     }
     const size_t n = (count + 15) & ~(size_t)15;
     for (size_t i = count; i < n; i++) { /* repeat one, for whole sixteens */

@@ -16,8 +16,8 @@ typedef struct used_list {
     size_t count;
 } used_list;
 
-static bool load_used(const kernel_scene *scene, const list_view *view, size_t part, const double middle[2],
-                      const hit_tape *tape, list_scratch *scratch, used_list *out)
+static bool load_used(const list_view *view, size_t part, const double middle[2], const hit_tape *tape,
+                      list_scratch *scratch, used_list *out)
 {
     const size_t begin = view->first[part], count = view->first[part + 1] - begin;
     if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, 18 * count + 1, sizeof(float),
@@ -46,7 +46,7 @@ static bool load_used(const kernel_scene *scene, const list_view *view, size_t p
     for (size_t i = 0; i < out->count; i++) {
         if (i + AHEAD < out->count)
             __builtin_prefetch(&view->records[pairs[pair[i + AHEAD]].record]);
-        read_gaussian(scene, &view->records[pairs[pair[i]].record], middle, pair[i], &out->gaussian[i]);
+        read_gaussian(&view->records[pairs[pair[i]].record], middle, pair[i], &out->gaussian[i]);
     }
     return true;
 }
@@ -381,7 +381,7 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
     used_list used;
     packet_hits rows;
     tile_middle(&view->part_boxes[part], middle);
-    if (!load_used(scene, view, part, middle, tape, scratch, &used) ||
+    if (!load_used(view, part, middle, tape, scratch, &used) ||
         !reserve_rows_of_list(scratch, used.count, true, &rows))
         return false;
     size_t at = 0;

@@ -22,13 +22,13 @@ typedef struct ray_limits {
 } ray_limits;
 
 /* One row more, when it has a hit. */
-static inline void append_response(const packet_hits *rows, size_t *count, const tile_gaussian *g,
-                                   uint32_t number, row_response r, vfloat16 alpha_max, ray_limits *limits)
+static inline void append_response(const packet_hits *rows, size_t *count, uint32_t number, row_response r,
+                                   vfloat16 alpha_min, vfloat16 alpha_max, ray_limits *limits)
 {
     const int at = (int)*count;
     const vfloat16 zero = vfloat16_set1(0);
     const vmask16 seen = vmask16_and(vfloat16_lt(r.t, limits->far), vfloat16_le(limits->near, r.t)),
-                  hit = vmask16_and(vfloat16_le(vfloat16_set1(g->threshold), r.raw), seen);
+                  hit = vmask16_and(vfloat16_le(alpha_min, r.raw), seen);
     const vfloat16 alpha = vfloat16_select(hit, vfloat16_min(r.raw, alpha_max), zero);
     row_store(rows->t, at, r.t);
     row_store(rows->alpha, at, alpha);
@@ -46,6 +46,7 @@ static void evaluate_queue(const packet_pass *p, const tile_list *list, const ro
     const packet_rays *rays = p->rays;
     const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
                    length = vfloat16_load(p->slopes.length),
+                   alpha_min = vfloat16_set1(scene->settings.alpha_min),
                    alpha_max = vfloat16_set1(scene->settings.alpha_max);
     const packet_hits rows = *out;
     const tile_gaussian *gaussian = list->gaussian;
@@ -58,7 +59,7 @@ static void evaluate_queue(const packet_pass *p, const tile_list *list, const ro
             g[k] = &gaussian[queue->number[first + k < take ? first + k : take - 1]];
         respond_rows(scene, rays, g, a, b, length, r, NULL);
         for (unsigned k = 0; k < TOGETHER && first + k < take; k++)
-            append_response(&rows, &count, g[k], queue->number[first + k], r[k], alpha_max, &now);
+            append_response(&rows, &count, queue->number[first + k], r[k], alpha_min, alpha_max, &now);
     }
     out->count = count;
     *limits = now;

@@ -73,19 +73,16 @@ static inline vfloat16 open_square(vfloat16 square)
 static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opacity, unsigned lanes)
 {
     _Alignas(64) float cut[16] = {0};
-    const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius;
     for (int i = 0; i < 16; i++)
         if (lanes >> i & 1)
-            cut[i] = smaller(2 * logf(opacity[i] / scene->settings.alpha_min), radius2);
+            cut[i] = 2 * logf(opacity[i] / scene->settings.alpha_min);
     return open_square(vfloat16_load(cut));
 }
 
 /* The same of opacity 1, or of their own if that is more. */
 static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
 {
-    const float radius2 = scene->settings.proxy_radius * scene->settings.proxy_radius,
-                whole = smaller(2 * logf(1 / scene->settings.alpha_min), radius2);
-    return vfloat16_max(cut, open_square(vfloat16_set1(whole)));
+    return vfloat16_max(cut, open_square(vfloat16_set1(2 * logf(1 / scene->settings.alpha_min))));
 }
 
 typedef struct outline_lanes {

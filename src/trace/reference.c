@@ -48,9 +48,7 @@ static prepared prepare(const reference_scene *scene, const trace_settings *s, s
         for (int k = 0; k < 3; k++)
             p.canon[3 * axis + k] = r[3 * k + axis] / field(scene, REFERENCE_scale_x + (unsigned)axis, i);
     }
-    p.d2_max = is_usable(scene, i)
-                   ? fmin(2 * log(p.opacity / (double)s->alpha_min) + 1e-6, pow((double)s->proxy_radius, 2))
-                   : -HUGE_VAL;
+    p.d2_max = is_usable(scene, i) ? 2 * log(p.opacity / (double)s->alpha_min) + 1e-6 : -HUGE_VAL;
     return p;
 }
 

@@ -3,7 +3,6 @@
 #ifndef GBT_TRACE_SETTINGS_H
 #define GBT_TRACE_SETTINGS_H
 
-#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -14,32 +13,27 @@ typedef struct trace_settings {
     float alpha_min; /* a hit counts when alpha >= this; > 0. Default 1/255 */
     float alpha_max; /* alpha is cut here; the gradient through the cut is exactly 0. (0, 1). Default 0.99 */
     float transmittance_min; /* stop before the hit that would bring T below this. Default 1e-4 */
-    float proxy_radius;  /* a hit counts within this many std-devs; > 0. Default: infinite, alpha_min alone
-                            decides */
-    float t_near;        /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
-    float background[3]; /* blended last, with the remaining T. Default 0 */
-    sky sky;             /* what is added to it by the ray's direction. Default nothing */
-    bool packet_order;   /* blend the hits of 4 x 4 neighbouring rays in one order, and not each ray's own in
-                            its own order: first the Gaussians that one of them hits at t_near, by index; then
-                            by their depth on a ray in the middle, which counts as at least half and at most
-                            twice that on the next ray that is hit; hits behind those that have made a ray
-                            opaque may be left out. An approximation for training, docs/tracing.md; only rays
-                            that go over lists heed it. Default false */
+    float t_near;            /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
+    float background[3];     /* blended last, with the remaining T. Default 0 */
+    sky sky;                 /* what is added to it by the ray's direction. Default nothing */
+    bool packet_order; /* blend the hits of 4 x 4 neighbouring rays in one order, and not each ray's own in
+                          its own order: first the Gaussians that one of them hits at t_near, by index; then
+                          by their depth on a ray in the middle, which counts as at least half and at most
+                          twice that on the next ray that is hit; hits behind those that have made a ray
+                          opaque may be left out. An approximation for training, docs/tracing.md; only rays
+                          that go over lists heed it. Default false */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)
 {
-    return (trace_settings){.alpha_min = 1.0f / 255.0f,
-                            .alpha_max = 0.99f,
-                            .transmittance_min = 1e-4f,
-                            .proxy_radius = INFINITY,
-                            .t_near = 0.01f};
+    return (trace_settings){
+        .alpha_min = 1.0f / 255.0f, .alpha_max = 0.99f, .transmittance_min = 1e-4f, .t_near = 0.01f};
 }
 
 /**
  * Set how much is left out of a picture; bounds on what that changes: docs/accuracy.md.
  *
- * Sets alpha_min, transmittance_min and proxy_radius. The rest is what the model was trained with, and stays.
+ * Sets alpha_min and transmittance_min. The rest is what the model was trained with, and stays.
  * GBT_PRESET_AS_TRAINED sets nothing.
  */
 static inline void trace_settings_preset(gbt_preset preset, trace_settings *out)
@@ -53,7 +47,6 @@ static inline void trace_settings_preset(gbt_preset preset, trace_settings *out)
         return;
     out->alpha_min = presets[preset].alpha_min;
     out->transmittance_min = presets[preset].transmittance_min;
-    out->proxy_radius = INFINITY;
 }
 
 #endif

@@ -60,8 +60,7 @@ static gbt_status build_tree(trace_scene *scene, gbt_error *err)
 {
     if (scene->tree_ready)
         return GBT_OK;
-    GBT_TRY(gaussian_tree_build(scene->source, scene->settings.alpha_min, scene->settings.proxy_radius,
-                                scene->reach, &scene->tree, err));
+    GBT_TRY(gaussian_tree_build(scene->source, scene->settings.alpha_min, scene->reach, &scene->tree, err));
     scene->tree_ready = true;
     return GBT_OK;
 }
@@ -78,8 +77,7 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
     parallel_blocks(g->count, RECORD_BLOCK, write_records, scene);
     scene->tree_ready = false;
     if (scene->kernel == TRACE_EMBREE)
-        return gaussian_scene_build(g, settings->alpha_min, settings->proxy_radius, reach, &scene->embree,
-                                    err);
+        return gaussian_scene_build(g, settings->alpha_min, reach, &scene->embree, err);
     return scene->kernel == TRACE_LIST ? GBT_OK : build_tree(scene, err);
 }
 
@@ -90,9 +88,7 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
                           .embree = embree && scene->embree.box_count > 0 ? &scene->embree : NULL,
                           .records = scene->records,
                           .coordinate_max = fmaxf(scene->tree.coordinate_max, scene->reach),
-                          .settings = scene->settings,
-                          .radius_response =
-                              expf(-0.5f * scene->settings.proxy_radius * scene->settings.proxy_radius)};
+                          .settings = scene->settings};
 }
 
 /* ---- memory of the tiles in flight, from tile to tile ---- */

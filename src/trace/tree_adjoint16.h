@@ -118,7 +118,7 @@ static void view_rows(const kernel_scene *scene, const tile_beam *beam, const ta
         adjoint_group *group = &o->group[first / 16];
         view_axes axes;
         const gaussian_lanes g = entry_gaussians(scene, entry, first, o->sorted.count, NULL);
-        const vmask16 sound = view_gaussians_from(scene, &g, beam, &group->view, &axes);
+        const vmask16 sound = view_gaussians_from(&g, beam, &group->view, &axes);
         /* Beside the camera the slopes of the mean run away. */
         const vfloat16 wide = vfloat16_set1(8), a = vfloat16_load(group->view.field[VIEW_A]),
                        b = vfloat16_load(group->view.field[VIEW_B]);

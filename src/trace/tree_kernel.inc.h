@@ -45,11 +45,11 @@ static void start_packet(packet_rows *p, const packet_rays *rays)
     p->alive = vmask16_from_bits(rays->active);
 }
 
-static inline void append_row(packet_rows *p, uint32_t id, vfloat16 t, vfloat16 raw, vfloat16 threshold,
+static inline void append_row(packet_rows *p, uint32_t id, vfloat16 t, vfloat16 raw,
                               const trace_settings *settings, kernel_counters *counters)
 {
-    const vmask16 hit =
-        vmask16_and(vmask16_and(vfloat16_le(threshold, raw), vfloat16_lt(t, p->far)), p->alive);
+    const vmask16 hit = vmask16_and(
+        vmask16_and(vfloat16_le(vfloat16_set1(settings->alpha_min), raw), vfloat16_lt(t, p->far)), p->alive);
     row_store(p->t, p->count, vfloat16_select(hit, t, vfloat16_set1(INFINITY)));
     row_store(p->alpha, p->count,
               vfloat16_select(hit, vfloat16_min(raw, vfloat16_set1(settings->alpha_max)), vfloat16_set1(0)));
@@ -282,16 +282,14 @@ static inline void evaluate(tile_state *s, const kernel_scene *scene, const pack
     if (s->in_front[number / 16] >> number % 16 & 1) {
         const view_gaussians *view = &s->view[number / 16];
         const view_response r = view_respond(view, number % 16, &s->view_rays[packet]);
-        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent),
-                   vfloat16_set1(view->field[VIEW_THRESHOLD][number % 16]), &scene->settings, counters);
+        append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), &scene->settings, counters);
         return;
     }
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     ray_lanes ray;
     load_rays(rays, &ray);
     const response r = respond(&g, &ray, vfloat16_set1(scene->settings.t_near));
-    append_row(rows, id, r.t, response_alpha(&g, r.d2), alpha_threshold(scene, g.opacity), &scene->settings,
-               counters);
+    append_row(rows, id, r.t, response_alpha(&g, r.d2), &scene->settings, counters);
 }
 
 /* Every live packet evaluates the candidates that reach into its beam and blends what lies before `horizon`.
@@ -304,7 +302,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         for (int i = 0; i < 16; i++)
             id[i] = s->id[first + i < s->count ? first + i : first];
         const gaussian_lanes g = load_gaussians(scene, id, NULL);
-        const vmask16 sound = view_gaussians_from(scene, &g, &s->beam, &s->view[first / 16], NULL);
+        const vmask16 sound = view_gaussians_from(&g, &s->beam, &s->view[first / 16], NULL);
         s->in_front[first / 16] &= (uint16_t)vmask16_bits(sound);
     }
     for (unsigned packets = s->alive_packets; packets != 0; packets &= packets - 1) {

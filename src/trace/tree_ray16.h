@@ -201,7 +201,7 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     const gaussian_lanes g = load_gaussians(scene, id, color);
     const response at = respond(&g, ray, vfloat16_set1(scene->settings.t_near));
     const vfloat16 raw = response_alpha(&g, at.d2);
-    const vmask16 hit = vmask16_and(vfloat16_le(alpha_threshold(scene, g.opacity), raw),
+    const vmask16 hit = vmask16_and(vfloat16_le(vfloat16_set1(scene->settings.alpha_min), raw),
                                     vfloat16_lt(at.t, vfloat16_set1(r->far)));
     _Alignas(64) float t[TREE_WIDTH], alpha[TREE_WIDTH];
     vfloat16_store(t, at.t),

@@ -13,16 +13,7 @@ typedef struct view_rays {
 } view_rays;
 
 /* Sixteen Gaussians; a row reads one of them. */
-enum {
-    VIEW_A,
-    VIEW_B,
-    VIEW_Q,
-    VIEW_DEPTH = VIEW_Q + 5,
-    VIEW_FALLOFF,
-    VIEW_OPACITY,
-    VIEW_THRESHOLD,
-    VIEW_FIELDS
-};
+enum { VIEW_A, VIEW_B, VIEW_Q, VIEW_DEPTH = VIEW_Q + 5, VIEW_FALLOFF, VIEW_OPACITY, VIEW_FIELDS };
 typedef struct view_gaussians {
     _Alignas(64) float field[VIEW_FIELDS][16]; /* FALLOFF: R^2 log2(e) / 2, so that the response is
                                                   2^(-FALLOFF y / den) */
@@ -45,8 +36,8 @@ static inline view_rays see_rays(const packet_rays *rays, const tile_beam *b)
 }
 
 /* Returned are the lanes whose form is sound. `axes` may be NULL. */
-static inline vmask16 view_gaussians_from(const kernel_scene *scene, const gaussian_lanes *g,
-                                          const tile_beam *b, view_gaussians *out, view_axes *axes)
+static inline vmask16 view_gaussians_from(const gaussian_lanes *g, const tile_beam *b, view_gaussians *out,
+                                          view_axes *axes)
 {
     vfloat16 offset[3];
     view_form form;
@@ -64,7 +55,6 @@ static inline vmask16 view_gaussians_from(const kernel_scene *scene, const gauss
     vfloat16_store(out->field[VIEW_DEPTH], depth);
     vfloat16_store(out->field[VIEW_FALLOFF], form.falloff);
     vfloat16_store(out->field[VIEW_OPACITY], g->opacity);
-    vfloat16_store(out->field[VIEW_THRESHOLD], alpha_threshold(scene, g->opacity));
     if (axes != NULL) {
         memcpy(axes->e, form.e, sizeof form.e);
         axes->distance = form.distance;

@@ -65,12 +65,12 @@ static void no_device_is_an_error(void **state)
             _exit(15);
         gaussian_tree tree = {0};
         err = (gbt_error){0};
-        status = gaussian_tree_build(&g, 0.01f, INFINITY, 1, &tree, &err);
+        status = gaussian_tree_build(&g, 0.01f, 1, &tree, &err);
         if (status == GBT_OK || status != err.status || err.text[0] == '\0')
             _exit(17);
         gaussian_scene scene = {0};
         err = (gbt_error){0};
-        status = gaussian_scene_build(&g, 0.01f, INFINITY, 1, &scene, &err);
+        status = gaussian_scene_build(&g, 0.01f, 1, &scene, &err);
         if (status == GBT_OK || status != err.status || err.text[0] == '\0')
             _exit(18);
         if (bvh_embree_version()[0] != '3' && bvh_embree_version()[0] != '4')

@@ -199,7 +199,7 @@ static void agrees_with_brute_force(void **state)
     visits v = {.gaussian_count = c->count, .times = mem_alloc(c->count, SCENE_LANES, "visits", NULL)};
     assert_non_null(v.times);
     size_t reached_count = 0, visited_count = 0;
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, (float)largest_coordinate(c), &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, (float)largest_coordinate(c), &scene, NULL));
     const double reach = fmax((double)scene.coordinate_max, largest_coordinate(c));
     for (uint64_t number = 0; number < PACKETS; number++) {
         const ray_packet p = make_packet(c, seed, number);
@@ -262,7 +262,7 @@ static void the_same_for_every_thread_count(void **state)
     for (int threads = 1; threads <= 2; threads++) {
         gaussian_scene scene = {0};
         parallel_set_threads(threads);
-        assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL));
+        assert_ok(gaussian_scene_build(&g, alpha_min, 12, &scene, NULL));
         parallel_blocks(PACKETS, 1, visit_packets,
                         &(thread_job){.scene = &scene, .times = threads == 1 ? want : got});
         gaussian_scene_free(&scene);
@@ -290,20 +290,20 @@ static void empty_scenes(void **state)
     const ray_packet p = make_packet(&cloud_cases[2], 1, 0);
     gaussian_scene scene = {0};
     gaussians g = {0};
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL));
     gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, 0xffff, no_visit, NULL);
     fill_cloud(&cloud_cases[2], 1, &g);
     g.opacity[0] = alpha_min; /* at the cut: no proxy */
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL));
     assert_int_equal(scene.box_count, 0);
     assert_int_equal(scene.rejected_count, 0);
     gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, 0xffff, no_visit, NULL);
     g.opacity[0] = 0.9f;
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL));
     assert_int_equal(scene.box_count, 1);
     gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, 0, no_visit, NULL); /* no ray is active */
     assert_ok(gaussians_resize(&g, 0, NULL));
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL)); /* and empty again */
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL)); /* and empty again */
     assert_int_equal(scene.box_count, 0);
     gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, 0xffff, no_visit, NULL);
     gaussian_scene_free(&scene);
@@ -323,7 +323,7 @@ static void boxes_are_tight(void **state)
         gaussian_scene scene = {0};
         fill_cloud(&c, seed, &g);
         g.opacity[0] = 0.9f;
-        assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 20, &scene, NULL));
+        assert_ok(gaussian_scene_build(&g, alpha_min, 20, &scene, NULL));
         const double q[4] = {(double)g.quat_w[0], (double)g.quat_x[0], (double)g.quat_y[0],
                              (double)g.quat_z[0]},
                      k = sqrt(2 * log(0.9 * 255));
@@ -391,8 +391,8 @@ static void bad_gaussians_are_counted(void **state)
     g.opacity[i++] = alpha_min;
     gaussian_scene scene = {0};
     gaussian_tree tree = {0};
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
-    assert_ok(gaussian_tree_build(&g, alpha_min, INFINITY, 4, &tree, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL));
+    assert_ok(gaussian_tree_build(&g, alpha_min, 4, &tree, NULL));
     assert_int_equal(scene.rejected_count, rejected);
     assert_int_equal(scene.box_count, c.count - i);
     assert_int_equal(tree.rejected_count, rejected);
@@ -437,7 +437,7 @@ static void bad_rays_cross_nothing(void **state)
     gaussians g = {0};
     gaussian_scene scene = {0};
     fill_cloud(&c, 4, &g);
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 4, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 4, &scene, NULL));
     visits v = {.gaussian_count = c.count, .times = mem_calloc(c.count, SCENE_LANES, "visits", NULL)};
     assert_non_null(v.times);
     for (size_t b = 0; b < sizeof bad / sizeof *bad; b++) {
@@ -467,23 +467,23 @@ static void memory_is_counted_and_limited(void **state)
     gaussians g = {0};
     gaussian_scene scene = {0};
     fill_cloud(&cloud_cases[0], 1, &g);
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL)); /* Embree's own tables exist
+    assert_ok(gaussian_scene_build(&g, alpha_min, 12, &scene, NULL)); /* Embree's own tables exist
                                                                                    from here */
     gaussian_scene_free(&scene);
     const size_t before = bvh_memory_bytes();
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 12, &scene, NULL));
     const size_t held = bvh_memory_bytes() - before;
     assert_true(held > 20 * g.count && held < 1000 * g.count);
     gaussian_scene_free(&scene);
     assert_int_equal(bvh_memory_bytes(), before);
     bvh_limit_memory(before + 1000);
     gbt_error err = {0};
-    assert_int_equal(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, &err), GBT_ERR_NO_MEMORY);
+    assert_int_equal(gaussian_scene_build(&g, alpha_min, 12, &scene, &err), GBT_ERR_NO_MEMORY);
     assert_int_equal(err.status, GBT_ERR_NO_MEMORY);
     assert_int_equal(scene.box_count, 0);
     gaussian_scene_visit(&scene, p.origin, p.dir, 0, INFINITY, 0xffff, no_visit, NULL);
     bvh_limit_memory(SIZE_MAX);
-    assert_ok(gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, NULL));
+    assert_ok(gaussian_scene_build(&g, alpha_min, 12, &scene, NULL));
     assert_true(scene.box_count > 0);
     gaussian_scene_free(&scene);
     gaussians_free(&g);
@@ -503,9 +503,8 @@ static void builds_are_whole_or_refused(void **state)
             gaussian_tree tree = {0};
             gbt_error err = {0};
             bvh_limit_memory(before + allowed);
-            const gbt_status status = is_tree
-                                          ? gaussian_tree_build(&g, alpha_min, INFINITY, 12, &tree, &err)
-                                          : gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, &err);
+            const gbt_status status = is_tree ? gaussian_tree_build(&g, alpha_min, 12, &tree, &err)
+                                              : gaussian_scene_build(&g, alpha_min, 12, &scene, &err);
             bvh_limit_memory(SIZE_MAX);
             assert_int_equal(status == GBT_OK, is_tree ? tree.root != NULL : scene.box_count > 0);
             gaussian_tree_free(&tree);
@@ -533,7 +532,7 @@ static void no_memory_is_an_error(void **state)
         gaussian_scene scene = {0};
         gbt_error err = {0};
         mem_fail_after(n);
-        status = gaussian_scene_build(&g, alpha_min, INFINITY, 12, &scene, &err);
+        status = gaussian_scene_build(&g, alpha_min, 12, &scene, &err);
         mem_fail_after(-1);
         if (status != GBT_OK) {
             assert_int_equal(status, GBT_ERR_NO_MEMORY);
@@ -555,7 +554,7 @@ static void boxes_are_padded(void **state)
     gaussians g = {0};
     proxy_boxes boxes = {0};
     fill_cloud(&c, 4, &g);
-    assert_ok(proxy_boxes_make(&g, alpha_min, INFINITY, 2000, &boxes, NULL));
+    assert_ok(proxy_boxes_make(&g, alpha_min, 2000, &boxes, NULL));
     const double pad = (double)bvh_box_pad(2000);
     for (size_t b = 0; b < boxes.count; b++) {
         const struct RTCBuildPrimitive *box = &boxes.box[b];

@@ -127,13 +127,11 @@ static expected expect_ray(const gaussians *g, const trace_settings *s, const ra
         dir[k] = (double)rays->dir[3 * ray + k];
     }
     assert_ok(reference_ray_hits(g, &loose, origin, dir, hits, &count, capacity, NULL));
-    const double far = rays->far == NULL ? HUGE_VAL : (double)rays->far[ray],
-                 cut = (double)s->proxy_radius * (double)s->proxy_radius;
+    const double far = rays->far == NULL ? HUGE_VAL : (double)rays->far[ray];
     for (size_t i = 0; i < count; i++) {
         const reference_hit *h = &(*hits)[i];
-        e.fine = e.fine && fabs(h->alpha - (double)s->alpha_min) > 1e-6 && fabs(h->d2 - cut) > 1e-4 &&
-                 fabs(h->t - far) > 1e-5;
-        if (h->alpha < (double)s->alpha_min || h->d2 > cut || h->t >= far)
+        e.fine = e.fine && fabs(h->alpha - (double)s->alpha_min) > 1e-6 && fabs(h->t - far) > 1e-5;
+        if (h->alpha < (double)s->alpha_min || h->t >= far)
             continue;
         e.fine = e.fine && h->t - before > 2e-6 * h->t;
         before = h->t;
@@ -290,24 +288,20 @@ static void kernels_share_the_adjoint(void **state)
     gaussians_free(&g);
 }
 
-/* Rays that end at a surface, in front of everything, inside and behind; and a fixed radius in place of
-   alpha_min alone. */
-static void surfaces_and_radius(void **state)
+/* Rays that end at a surface, in front of everything, inside and behind. */
+static void surfaces(void **state)
 {
     (void)state;
     gaussians g = cloud(600, 8, 0.8f, 0.15f, 0.9f);
     ray_image rays = make_rays(false);
-    trace_settings s = trace_settings_default();
+    const trace_settings s = trace_settings_default();
     rays.far = mem_alloc(RAYS, sizeof *rays.far, "test", NULL);
     for (size_t i = 0; i < RAYS; i++)
         rays.far[i] = i % 7 == 0 ? INFINITY : 3 + 4 * rng_uniform(1, 1, i);
-    for (int round = 0; round < 2; round++) {
-        s.proxy_radius = round == 0 ? INFINITY : 1.5f;
-        for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
-            pass_result *r = run(&g, &s, &rays, (trace_kernel)kernel, 0);
-            check_run(kernel_names[kernel], &g, &s, &rays, r);
-            pass_free(r);
-        }
+    for (int kernel = TRACE_LIST; kernel <= TRACE_EMBREE; kernel++) {
+        pass_result *r = run(&g, &s, &rays, (trace_kernel)kernel, 0);
+        check_run(kernel_names[kernel], &g, &s, &rays, r);
+        pass_free(r);
     }
     ray_image_free(&rays);
     gaussians_free(&g);
@@ -585,7 +579,7 @@ int main(void)
         cmocka_unit_test(all_kernels_all_outputs),
         cmocka_unit_test(depth_of_faint_hits),
         cmocka_unit_test(kernels_share_the_adjoint),
-        cmocka_unit_test(surfaces_and_radius),
+        cmocka_unit_test(surfaces),
         cmocka_unit_test(parts_of_rays),
         cmocka_unit_test(parts_are_listed_whatever_is_near),
         cmocka_unit_test(hits_are_sorted),

@@ -35,14 +35,14 @@ static void presets_by_name(void **state)
     s.alpha_max = 0.5f;
     s.t_near = 3;
     s.background[1] = 0.25f;
-    s.proxy_radius = 2;
+    s.alpha_min = 0.25f;
+    s.transmittance_min = 0.5f;
     before = s;
     trace_settings_preset(GBT_PRESET_AS_TRAINED, &s);
     assert_memory_equal(&s, &before, sizeof s);
     trace_settings_preset(GBT_PRESET_DEFAULT, &s);
     const trace_settings d = trace_settings_default();
-    assert_true(s.alpha_min == d.alpha_min && s.transmittance_min == d.transmittance_min &&
-                isinf(s.proxy_radius));
+    assert_true(s.alpha_min == d.alpha_min && s.transmittance_min == d.transmittance_min);
     assert_true(s.alpha_max == 0.5f && s.t_near == 3 && s.background[1] == 0.25f); /* the model's stay */
     const trace_settings exact = preset(GBT_PRESET_EXACT), fast = preset(GBT_PRESET_FAST);
     assert_true(exact.alpha_min < d.alpha_min && d.alpha_min < fast.alpha_min);
@@ -71,18 +71,18 @@ static void find_hits(const reference_scene *scene, const trace_settings *s, con
 
 /* What the bound of one ray is made of. */
 typedef struct ray_bound {
-    double dropped; /* W: weight that hits below alpha_min or beyond the radius have in the whole picture */
+    double dropped;      /* W: weight that hits below alpha_min have in the whole picture */
     double dropped_odds; /* 1 - prod (1 - alpha) over them */
     size_t dropped_count;
 } ray_bound;
 
-static ray_bound bound_ray(const ray_hits *list, double alpha_min, double d2_max)
+static ray_bound bound_ray(const ray_hits *list, double alpha_min)
 {
     ray_bound b = {0};
     double T = 1, open = 1;
     for (size_t i = 0; i < list->count; i++) {
         const double alpha = list->hits[i].alpha;
-        if (alpha < alpha_min || list->hits[i].d2 > d2_max) {
+        if (alpha < alpha_min) {
             b.dropped += T * alpha;
             open *= 1 - alpha;
             b.dropped_count++;
@@ -102,7 +102,6 @@ typedef struct preset_figures {
 typedef struct cut_row {
     const char *name;
     gbt_preset preset;
-    float radius;
     float alpha_max; /* 0: the model's, with and without cut-offs */
     double error_low, error_high;
 } cut_row;
@@ -111,7 +110,6 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
                                    const float background[3])
 {
     trace_settings s = preset(row->preset), all = whole(), uncut = all; /* uncut: but for alpha_max */
-    s.proxy_radius = row->radius;
     if (row->alpha_max > 0) {
         s.alpha_max = uncut.alpha_max = row->alpha_max;
         all.alpha_max = 0.9999999f;
@@ -120,8 +118,7 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
     memcpy(all.background, background, sizeof all.background);
     const size_t count = ray_image_count(rays);
     const double stop = (double)s.transmittance_min / (1 - (double)s.alpha_max),
-                 cap = row->alpha_max > 0 ? 1 - (double)s.alpha_max : 0,
-                 square = (double)s.proxy_radius * (double)s.proxy_radius;
+                 cap = row->alpha_max > 0 ? 1 - (double)s.alpha_max : 0;
     double *want = mem_alloc(count, 3 * sizeof *want, "test", NULL),
            *cut = mem_alloc(count, 3 * sizeof *cut, "test", NULL), color_max = 1;
     for (size_t i = 0; i < g->count; i++)
@@ -139,9 +136,9 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
     assert_ok(reference_scene_forward(&scene, &s, rays, cut, NULL, NULL, NULL));
     for (size_t i = 0; i < count; i++) {
         find_hits(&scene, &uncut, rays, i, &list);
-        const ray_bound b = bound_ray(&list, (double)s.alpha_min, square),
-                        wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4), square * (1 - 1e-4));
-        const double m = (double)b.dropped_count, a = fmax((double)s.alpha_min, exp(-0.5 * square));
+        const ray_bound b = bound_ray(&list, (double)s.alpha_min),
+                        wider = bound_ray(&list, (double)s.alpha_min * (1 + 1e-4));
+        const double m = (double)b.dropped_count, a = (double)s.alpha_min;
         assert_true(b.dropped <= b.dropped_odds + 1e-12);
         assert_true(b.dropped_odds <= 1 - pow(1 - a, m) + 1e-12 && 1 - pow(1 - a, m) <= m * a + 1e-12);
         const double bound = color_max * (b.dropped + stop + cap),
@@ -166,13 +163,10 @@ static preset_figures check_preset(const gaussians *g, const ray_image *rays, co
 static void check_scene(const char *scene, const gaussians *g, const ray_image *rays)
 {
     const float background[3] = {0, 0.5f, 1};
-    const cut_row rows[] = {{"exact", GBT_PRESET_EXACT, INFINITY, 0, 0, 0.5 * half_step},
-                            {"default", GBT_PRESET_DEFAULT, INFINITY, 0, half_step, INFINITY},
-                            {"fast", GBT_PRESET_FAST, INFINITY, 0, half_step, INFINITY},
-                            {"radius 3", GBT_PRESET_EXACT, 3, 0, 0, INFINITY},
-                            {"radius 2.5", GBT_PRESET_EXACT, 2.5f, 0, 0, INFINITY},
-                            {"radius 2", GBT_PRESET_EXACT, 2, 0, half_step, INFINITY},
-                            {"alpha_max", GBT_PRESET_EXACT, INFINITY, 0.9f, 0, INFINITY}};
+    const cut_row rows[] = {{"exact", GBT_PRESET_EXACT, 0, 0, 0.5 * half_step},
+                            {"default", GBT_PRESET_DEFAULT, 0, half_step, INFINITY},
+                            {"fast", GBT_PRESET_FAST, 0, half_step, INFINITY},
+                            {"alpha_max", GBT_PRESET_EXACT, 0.9f, 0, INFINITY}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const preset_figures f = check_preset(g, rays, &rows[i], background);
         print_message("%-14s %-10s max error %.2e, bound %.2e, %2.0f %% of a ray's bound reached\n", scene,

@@ -31,7 +31,8 @@ typedef enum gbt_camera_model {
     GBT_CAMERA_SIMPLE_FISHEYE = 14,             /* f cx cy */
     GBT_CAMERA_FISHEYE = 15,                    /* fx fy cx cy */
     GBT_CAMERA_EUCM = 16,                       /* fx fy cx cy alpha beta */
-    GBT_CAMERA_EQUIRECTANGULAR = 17,            /* w h */
+    GBT_CAMERA_EQUIRECTANGULAR = 17,            /* w h; and the last two of all params, 0 in data sets: the
+                                                   image point where the whole panorama begins */
     GBT_CAMERA_MODEL_COUNT,                     /* of COLMAP's models: what a data set can hold */
     GBT_CAMERA_ORTHOGRAPHIC = 100 /* sx sy cx cy, pixels per unit: parallel rays. COLMAP has no number for it
                                    */
@@ -49,7 +50,7 @@ typedef enum gbt_camera_shutter {
 typedef struct gbt_camera {
     gbt_camera_model model;
     int width, height;                    /* pixels, > 0 */
-    double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order; lengths in pixels */
+    double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order, then 0; lengths in pixels */
     double rotation[9];                   /* world to camera, row-major, orthonormal within 1e-3, det +1 */
     double center[3];                     /* camera centre, world (scene-local) units */
     gbt_camera_shutter shutter; /* with a rolling one, the pose is that of the image's middle, and */
@@ -111,8 +112,7 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
  * (i, j) of `out` is ray (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and
  * y are in [0, step). A rolling shutter goes on over its part of the time.
  *
- * @return false for a model without a principal point (equirectangular), and where no pixel would be left;
- *         `out` is untouched then
+ * @return false for an unknown model, and where no pixel would be left; `out` is untouched then
  */
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out);
 
@@ -120,7 +120,7 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
  * The camera whose pixel (i, j) has its middle at the point (i + 0.5 + dx, j + 0.5 + dy) of this one's
  * picture.
  *
- * @return false for a model without a principal point (equirectangular); `out` is untouched then
+ * @return false for an unknown model; `out` is untouched then
  */
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 

@@ -190,7 +190,7 @@ static void mean_of_photos(trainer *t, float mean[3], gbt_status *status, gbt_er
 {
     double sum[3] = {0}, pixels = 0;
     for (size_t i = 0; i < t->train_count && *status == GBT_OK; i++) {
-        *status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, why);
+        *status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, NULL, why);
         const size_t count =
             *status == GBT_OK ? (size_t)t->views[0].photo.width * (size_t)t->views[0].photo.height : 0;
         for (size_t k = 0; k < 3 * count; k++)
@@ -211,7 +211,7 @@ static gbt_status look_at(trainer *t, practice_result *out, gbt_error *why)
         status = frame_render(&t->views[0].frame, frame_neural(&t->anchors, &t->decoder), &camera,
                               &t->settings, false, why);
         if (status == GBT_OK)
-            status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, why);
+            status = photos_get(&t->photos, t->train_views[i], 0, &t->views[0].photo, NULL, why);
         if (status != GBT_OK)
             break;
         image *rgb = &t->views[0].frame.rgb;

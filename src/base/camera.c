@@ -70,20 +70,18 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)
         out.params[2] *= by_y;
         return out;
     }
+    const int center = camera_center_at(camera->model);
     out.params[0] *= by_x;
     out.params[1] *= by_y;
-    if (gbt_camera_param_count(camera->model) > 2) {
-        out.params[2] *= by_x;
-        out.params[3] *= by_y;
-    }
+    out.params[center] *= by_x;
+    out.params[center + 1] *= by_y;
     return out;
 }
 
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out)
 {
-    const int focal_count = camera_focal_count(camera->model);
-    if (gbt_camera_param_count(camera->model) < 3 || step < 1 || camera->width < step ||
-        camera->height < step)
+    const int focal_count = camera_focal_count(camera->model), center = camera_center_at(camera->model);
+    if (focal_count == 0 || step < 1 || camera->width < step || camera->height < step)
         return false;
     const double edge = 0.5 - 0.5 * step; /* of the first pixel of `out`, from that of `camera` */
     *out = camera_reading(camera, x + edge, y + edge, (double)step * (camera->width / step),
@@ -93,19 +91,19 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
     /* The middle of pixel i of `out`, i + 0.5, is the middle of pixel x + step i of `camera`. */
     for (int i = 0; i < focal_count; i++)
         out->params[i] /= step;
-    out->params[focal_count] = (camera->params[focal_count] - x - 0.5) / step + 0.5;
-    out->params[focal_count + 1] = (camera->params[focal_count + 1] - y - 0.5) / step + 0.5;
+    out->params[center] = (camera->params[center] - x - 0.5) / step + 0.5;
+    out->params[center + 1] = (camera->params[center + 1] - y - 0.5) / step + 0.5;
     return true;
 }
 
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out)
 {
-    if (gbt_camera_param_count(camera->model) < 3)
+    const int center = camera_center_at(camera->model);
+    if (center == 0)
         return false;
-    const int focal_count = camera_focal_count(camera->model);
     *out = camera_reading(camera, dx, dy, camera->width, camera->height);
-    out->params[focal_count] -= dx;
-    out->params[focal_count + 1] -= dy;
+    out->params[center] -= dx;
+    out->params[center + 1] -= dy;
     return true;
 }
 

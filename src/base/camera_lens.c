@@ -280,9 +280,10 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
 {
     double p[2];
     if (lens->kind == LENS_EQUIRECTANGULAR) {
-        if (!(px >= 0 && px <= lens->fx && py >= 0 && py <= lens->fy))
+        const double x = px - lens->cx, y = py - lens->cy;
+        if (!(x >= 0 && x <= lens->fx && y >= 0 && y <= lens->fy))
             return false;
-        const double longitude = (px / lens->fx - 0.5) * (2 * PI), down = (py / lens->fy - 0.5) * PI;
+        const double longitude = (x / lens->fx - 0.5) * (2 * PI), down = (y / lens->fy - 0.5) * PI;
         dir_cam[0] = cos(down) * sin(longitude);
         dir_cam[1] = sin(down);
         dir_cam[2] = cos(down) * cos(longitude);
@@ -386,8 +387,8 @@ bool camera_lens_project(const camera_lens *lens, const double point_cam[3], dou
     double p[2] = {0, 0}, scale;
     switch (lens->kind) {
     case LENS_EQUIRECTANGULAR:
-        pixel[0] = lens->fx * (atan2(x, z) / (2 * PI) + 0.5);
-        pixel[1] = lens->fy * (atan2(y, dvec_length2(x, z)) / PI + 0.5);
+        pixel[0] = lens->fx * (atan2(x, z) / (2 * PI) + 0.5) + lens->cx;
+        pixel[1] = lens->fy * (atan2(y, dvec_length2(x, z)) / PI + 0.5) + lens->cy;
         return true;
     case LENS_PERSPECTIVE:
     case LENS_FOV:

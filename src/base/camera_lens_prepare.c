@@ -83,7 +83,11 @@ static bool take_params(const gbt_camera *camera, const camera_model *model, cam
         else
             *places[model->slots[i]] = value;
     }
-    return true;
+    if (model->kind == LENS_EQUIRECTANGULAR) {
+        lens->cx = camera->params[camera_center_at(camera->model)];
+        lens->cy = camera->params[camera_center_at(camera->model) + 1];
+    }
+    return isfinite(lens->cx) && isfinite(lens->cy);
 }
 
 /* The closed forms: are their shape parameters in the domain? Without distortion they are a pinhole, and then

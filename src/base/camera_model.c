@@ -131,6 +131,11 @@ int camera_focal_count(gbt_camera_model model)
     return m == NULL ? 0 : m->slots[0] == LENS_F ? 1 : 2;
 }
 
+int camera_center_at(gbt_camera_model model)
+{
+    return model == GBT_CAMERA_EQUIRECTANGULAR ? GBT_CAMERA_MAX_PARAMS - 2 : camera_focal_count(model);
+}
+
 bool camera_model_has_prism(gbt_camera_model model)
 {
     const camera_model *m = camera_model_of(model);

@@ -63,6 +63,11 @@ bool camera_model_find(const char *name, size_t length, gbt_camera_model *out);
 /** How many focal lengths stand before the principal point: 1 or 2; 0 for an unknown model. */
 int camera_focal_count(gbt_camera_model model);
 
+/** Where in params the principal point stands: after the focal lengths. Panoramas, which have none in files,
+    have the image point where the whole of them begins at the end, where nobody leaves other models' values.
+ */
+int camera_center_at(gbt_camera_model model);
+
 /** Are there thin prism terms? */
 bool camera_model_has_prism(gbt_camera_model model);
 

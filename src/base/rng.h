@@ -23,7 +23,6 @@ enum {
     RNG_STREAM_NETWORKS = 2,       /* 0 alone: makes the seed of decoder_init() */
     RNG_STREAM_SEED_POINTS = 3,    /* samples */
     RNG_STREAM_PIXELS = 4,         /* views of the run, in the order of steps */
-    RNG_STREAM_PARTS = 6,          /* training photos */
     RNG_STREAM_BACKGROUND = 8,     /* views of the run */
     RNG_STREAM_LEFT_OUT = 10       /* << 48 | view of the run: one for each view; anchors */
 };

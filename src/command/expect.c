@@ -25,7 +25,7 @@ static double core_seconds_of_step(const gbt_camera *camera, const train_rules *
     double steps_per_second = 0;
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double progress = (part + 0.5) / PACE_SEGMENTS,
-                     megapixels = step_pixels_of(camera, rules, progress).pixels / 1e6,
+                     megapixels = step_pixel_count(camera, rules, progress) / 1e6,
                      hits = step_hits_per_pixel(rules, progress);
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;

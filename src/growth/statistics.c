@@ -53,7 +53,7 @@ typedef struct gather_job {
     const frame *f;
     growth_importance importance;
     growth_counting counting;
-    float t_near, parts;
+    float t_near;
 } gather_job;
 
 /* The first Gaussian of the visible anchors from `row` on. */
@@ -79,7 +79,7 @@ static void gather_importance(const gather_job *job, size_t begin, size_t end, s
 {
     const frame *f = job->f;
     growth_stats *s = job->stats;
-    const float rays = (float)ray_image_count(&f->rays) * job->parts * job->parts; /* of the whole photo */
+    const float rays = (float)ray_image_count(&f->rays);
     for (size_t v = begin; v < end; v++) {
         s->visit_count[stat_row(s, f, v)] += 1;
         if (job->importance == GROWTH_BY_OPACITY) {
@@ -178,8 +178,7 @@ static void gather_gradients(const gather_job *job, const gradient_view *view, s
         to_camera(view, gradient, d);
         const uint32_t slot = f->tape.slot[i];
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
-        /* The half width of one of n x n parts is 1/n of the photo's. */
-        s->grad_accum[at] += smaller(screen_gradient(view, p, d) * (float)job->parts, gradient_max);
+        s->grad_accum[at] += smaller(screen_gradient(view, p, d), gradient_max);
         s->grad_count[at] += 1;
     }
 }
@@ -195,8 +194,8 @@ static void gather_block(size_t block, size_t begin, size_t end, void *context)
 }
 
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
-                         growth_counting counting, float t_near, int parts)
+                         growth_counting counting, float t_near)
 {
-    gather_job job = {s, f, importance, counting, t_near, (float)parts};
+    gather_job job = {s, f, importance, counting, t_near};
     parallel_blocks(f->visible_count, GATHER_BLOCK, gather_block, &job);
 }

@@ -56,11 +56,10 @@ typedef enum growth_counting {
 } growth_counting;
 
 /** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say. `t_near` of the
-   cone. The view is one of `parts` x `parts` parts of a photo, >= 1, its loss a share of the photo's: added
-   is what the photo would say of what the part shows. `s` has a row for each anchor, or for each visible
-   one alone, in their order. Threads: uses all; same bits for every number. */
+   cone. `s` has a row for each anchor, or for each visible one alone, in their order. Threads: uses all; same
+   bits for every number. */
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
-                         growth_counting counting, float t_near, int parts);
+                         growth_counting counting, float t_near);
 
 /** Mean over the views that saw the Gaussian `slot` (anchor * K + offset); 0 when none did. */
 static inline float growth_mean_gradient(const growth_stats *s, size_t slot)

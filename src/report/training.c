@@ -59,7 +59,7 @@ static void find_marks(curves *c)
         /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to
            stay is a step of the schedule. */
         const bool stays =
-            i + 1 == c->log.count ||
+            i + 1 < c->log.count &&
             c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
         if (w * h > 1.5 * width * height && stays) {
             chart_mark *mark = &c->marks[c->mark_count++];

@@ -12,21 +12,21 @@ static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
 
 /* The loss of a view's picture from `camera`, as its exposure shows it: v->d_image. */
 static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_camera *camera,
-                               gbt_error *err)
+                               const unsigned char *photo_valid, gbt_error *err)
 {
     GBT_TRY(step_view_draw(t, v, view, camera, true, err));
     const unsigned char *valid;
     image_loss_result loss;
     float matrix[AFFINE_NUMBERS];
     double unused[AFFINE_NUMBERS];
-    GBT_TRY(frame_valid(&v->frame, photos_valid(&t->photos, view), &valid, err));
+    GBT_TRY(frame_valid(&v->frame, photo_valid, &valid, err));
     const bool exposed = t->exposures.count > 0;
     if (exposed)
         affine_fit(&v->frame.rgb, &v->photo, valid, 0, v->frame.rgb.width, matrix);
     return step_view_compare(v, valid, exposed ? matrix : NULL, &loss, unused, err);
 }
 
-/* The finest level at which a step has about as many pixels as one of training. */
+/* The finest level that has no more pixels than photos of which training picks from all levels. */
 static int finest_level(const trainer *t, size_t view)
 {
     for (int level = 0;; level++) {
@@ -53,16 +53,19 @@ static gbt_status align_view(trainer *t, step_view *v, size_t view, gbt_error *e
     gbt_camera *pose = &t->scene.views[view].camera;
     float moment1[POSE_NUMBERS] = {0}, moment2[POSE_NUMBERS] = {0};
     const int finest = finest_level(t, view), levels = level_count(t, view, finest);
+    const unsigned char *valid = NULL;
     *pose = t->poses.given[view];
-    for (int i = 0; i < STEPS; i++) {
+    for (int i = 0, before = -1; i < STEPS; i++) {
         if (stop_signal_seen())
             return base_fail(err, GBT_ERR_INTERRUPTED,
                              "stopped while held-out photos were aligned; the run is saved (resume goes on)");
         const int level = finest + levels - 1 - i * levels / STEPS;
         const gbt_camera camera = photos_camera(&t->photos, view, level);
         double gradient[POSE_NUMBERS], motion[POSE_NUMBERS];
-        GBT_TRY(photos_get(&t->photos, view, level, &v->photo, err));
-        GBT_TRY(compare_view(t, v, view, &camera, err));
+        if (level != before)
+            GBT_TRY(photos_get(&t->photos, view, level, &v->photo, &valid, err));
+        before = level;
+        GBT_TRY(compare_view(t, v, view, &camera, valid, err));
         GBT_TRY(frame_backward_gaussians(&v->frame, &v->d_image, err));
         GBT_TRY(frame_backward_pose(&v->frame, frame_neural(&t->anchors, &t->decoder), gradient, err));
         if (!pose_is_finite(gradient))

@@ -39,7 +39,7 @@ static double expected_step(const trainer *t, const step_speed *s, int part)
             const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
             sum += s->fixed_seconds +
                    s->load_seconds *
-                       pixel_load(&t->rules, step_pixels_of(&camera, &t->rules, progress).pixels, progress);
+                       pixel_load(&t->rules, step_pixel_count(&camera, &t->rules, progress), progress);
         }
     }
     return sum / (double)(PLACES * t->train_count);

@@ -85,29 +85,6 @@ void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d)
     parallel_blocks(g->count, GAUSSIAN_BLOCK, add_volume_gradient, &job);
 }
 
-typedef struct share_job {
-    gaussians *d;
-    float share;
-} share_job;
-
-static void scale_gradient(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const share_job *job = context;
-#define X(name, pad, meaning)                                                                                \
-    for (size_t i = begin; i < end; i++)                                                                     \
-        job->d->name[i] *= job->share;
-    GAUSSIANS_FIELDS(X)
-#undef X
-}
-
-void loss_share_gradient(int parts, gaussians *d)
-{
-    share_job job = {.d = d, .share = 1 / (float)(parts * parts)};
-    if (parts > 1)
-        parallel_blocks(d->count, GAUSSIAN_BLOCK, scale_gradient, &job);
-}
-
 double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT], double volume_weight)
 {
     enum { SCALE = 3 }; /* of the fields: means come first */

@@ -31,13 +31,6 @@ double loss_of_gaussians(const gaussians *g, double volume_weight);
 /** Adds the gradient of loss_of_gaussians() to `d`. */
 void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d);
 
-/**
- * Of one of parts x parts parts of a photo, the mean loss becomes the part's share of the photo's: `d` is
- * divided by their number. Adam's second moments remember whole photos for a thousand steps; without this a
- * part would move its Gaussians parts^2 times as far as a photo (docs/training.md).
- */
-void loss_share_gradient(int parts, gaussians *d);
-
 /** One Gaussian's share of loss_of_gaussians() before the mean, for checks in double. `field`: in the order
    of GAUSSIANS_FIELDS. */
 double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT], double volume_weight);

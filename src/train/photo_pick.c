@@ -60,9 +60,10 @@ void photo_pick_pixels(const unsigned char *bytes, int full_width, const photo_p
     parallel_blocks((size_t)out->height, PICK_ROWS, pick_rows, &job);
 }
 
-void photo_pick_marks(const unsigned char *marks, int full_width, const photo_pick *pick, unsigned char *out)
+void photo_pick_marks(const unsigned char *marks, int full_width, const photo_pick *pick, int width,
+                      int height, unsigned char *out)
 {
-    const size_t w = (size_t)pick->width, h = (size_t)pick->height, step = (size_t)pick->step;
+    const size_t w = (size_t)width, h = (size_t)height, step = (size_t)pick->step;
     marks += first_of(pick, full_width);
     for (size_t y = 0; y < h; y++)
         for (size_t x = 0; x < w; x++)

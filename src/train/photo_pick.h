@@ -5,22 +5,23 @@
 
 #include "base/image.h"
 
-/** Which pixels: the first, how far apart they are, and how many. */
+/** Which pixels: the first, and how far apart they are. */
 typedef struct photo_pick {
-    int first[2], step, width, height;
+    int first[2], step;
 } photo_pick;
 
 /**
  * @param bytes        [in]  RGB, rows of `full_width` pixels
  * @param transparency [in]  optional (NULL), of the same pixels: how transparent each is, 255: wholly
  * @param change       [in]  [3], with `transparency`: what is added to the colour behind what is transparent
- * @param out          [out] 3 channels; its size says how many pixels, not the pick's
+ * @param out          [out] 3 channels; its size says how many pixels
  * Threads: parallel inside.
  */
 void photo_pick_pixels(const unsigned char *bytes, int full_width, const photo_pick *pick,
                        const unsigned char *transparency, const float *change, image *out);
 
-/** Of marks of one byte a pixel those of the pick: `out` is [pick->height][pick->width]. */
-void photo_pick_marks(const unsigned char *marks, int full_width, const photo_pick *pick, unsigned char *out);
+/** Of marks of one byte a pixel those of the pick: `out` is [height][width]. */
+void photo_pick_marks(const unsigned char *marks, int full_width, const photo_pick *pick, int width,
+                      int height, unsigned char *out);
 
 #endif

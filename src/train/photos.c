@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photos.c -- training photos, cached as bytes: at full size, and at the level in use. */
+/* train/photos.c -- training photos, kept as bytes. */
 #include "train/photos.h"
 
 #include <math.h>
@@ -103,35 +103,22 @@ gbt_status photos_open(photos *p, const scene *source, double downscale, gbt_err
     *p = (photos){.source = source,
                   .downscale = downscale > 0 ? downscale : 1,
                   .bytes_max = kept_bytes(),
-                  .kept_until_next = SIZE_MAX,
-                  .level_kept_until_next = SIZE_MAX};
+                  .kept_until_next = SIZE_MAX};
     p->full = mem_calloc(source->view_count, sizeof *p->full, "photo cache", err);
-    p->pixels = mem_calloc(source->view_count, sizeof *p->pixels, "photo cache", err);
     p->full_valid = mem_calloc(source->view_count, sizeof *p->full_valid, "photo cache", err);
-    p->valid = mem_calloc(source->view_count, sizeof *p->valid, "photo cache", err);
     p->transparency = mem_calloc(source->view_count, sizeof *p->transparency, "photo cache", err);
-    return p->full == NULL || p->pixels == NULL || p->full_valid == NULL || p->valid == NULL ||
-                   p->transparency == NULL
-               ? GBT_ERR_NO_MEMORY
-               : GBT_OK;
-}
-
-static void drop_all(unsigned char **pixels, size_t count)
-{
-    for (size_t i = 0; pixels != NULL && i < count; i++) {
-        mem_free(pixels[i]);
-        pixels[i] = NULL;
-    }
+    return p->full == NULL || p->full_valid == NULL || p->transparency == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
 }
 
 void photos_close(photos *p)
 {
-    unsigned char **const caches[] = {p->full, p->pixels, p->full_valid, p->valid, p->transparency};
-    for (int i = 0; i < 5; i++) {
-        drop_all(caches[i], p->source->view_count);
-        mem_free(caches[i]);
+    unsigned char **const caches[] = {p->full, p->full_valid, p->transparency};
+    for (int k = 0; k < 3; k++) {
+        for (size_t i = 0; caches[k] != NULL && i < p->source->view_count; i++)
+            mem_free(caches[k][i]);
+        mem_free(caches[k]);
     }
-    mem_free(p->sample_valid);
+    mem_free(p->some_valid);
     memset(p, 0, sizeof *p);
 }
 
@@ -164,9 +151,9 @@ static void from_bytes(const unsigned char *bytes, image *out)
     photo_pick_pixels(bytes, out->width, &(photo_pick){.step = 1}, NULL, NULL, out);
 }
 
-static size_t pixel_count(const photos *p, size_t view, int level)
+static size_t pixel_count(const photos *p, size_t view)
 {
-    const gbt_camera camera = photos_camera(p, view, level);
+    const gbt_camera camera = photos_camera(p, view, 0);
     return (size_t)camera.width * (size_t)camera.height;
 }
 
@@ -176,7 +163,7 @@ static size_t full_bytes(const photos *p, size_t view)
     const scene_view *v = &p->source->views[view];
     const int more = p->full[view] == NULL ? (v->mask_path != NULL) + v->has_alpha
                                            : (p->full_valid[view] != NULL) + (p->transparency[view] != NULL);
-    return (size_t)(3 + more) * pixel_count(p, view, 0);
+    return (size_t)(3 + more) * pixel_count(p, view);
 }
 
 static void drop_full(photos *p, size_t view)
@@ -330,79 +317,34 @@ gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *
     for (size_t i = 0; i < count && !*any; i++) {
         GBT_TRY(photos_read_full(p, views[i], err));
         const unsigned char *valid = p->full_valid[views[i]];
-        *any = valid == NULL || memchr(valid, 1, pixel_count(p, views[i], 0)) != NULL;
+        *any = valid == NULL || memchr(valid, 1, pixel_count(p, views[i])) != NULL;
     }
     return GBT_OK;
 }
 
-/* The marks of a photo at p->level, if it has any. Made before its pixels, which say that both are there. */
-static gbt_status resize_valid(photos *p, size_t view, const gbt_camera *camera, gbt_error *err)
+/* A photo at a level above 0, and its marks: p->some_valid. */
+static gbt_status get_smaller(photos *p, size_t view, int level, image *out, gbt_error *err)
 {
-    if (p->full_valid[view] == NULL || p->valid[view] != NULL)
-        return GBT_OK;
-    const gbt_camera full = photos_camera(p, view, 0);
-    return photo_resize_valid(p->full_valid[view], full.width, full.height, camera->width, camera->height,
-                              &p->valid[view], err);
-}
-
-const unsigned char *photos_valid(const photos *p, size_t view)
-{
-    return p->level == 0 ? p->full_valid[view] : p->valid[view];
-}
-
-static void drop_level_kept_until_next(photos *p)
-{
-    if (p->level_kept_until_next == SIZE_MAX)
-        return;
-    unsigned char **const caches[] = {p->pixels, p->valid};
-    for (int i = 0; i < 2; i++) {
-        mem_free(caches[i][p->level_kept_until_next]);
-        caches[i][p->level_kept_until_next] = NULL;
-    }
-    p->level_kept_until_next = SIZE_MAX;
-}
-
-/* What was made for `level` stays if there is room, else until the next is made. */
-static void count_level(photos *p, size_t view)
-{
-    const size_t more = (size_t)(3 + (p->valid[view] != NULL)) * pixel_count(p, view, p->level);
-    if (p->bytes + more > p->bytes_max) {
-        p->level_kept_until_next = view;
-        return;
-    }
-    p->bytes += more;
-    p->level_bytes += more;
-}
-
-gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err)
-{
-    if (level != p->level) {
-        drop_all(p->pixels, p->source->view_count);
-        drop_all(p->valid, p->source->view_count);
-        p->level = level;
-        p->bytes -= p->level_bytes;
-        p->level_bytes = 0;
-        p->level_kept_until_next = SIZE_MAX;
-    }
-    if (level == 0)
-        return get_full(p, view, out, err);
     const gbt_camera camera = photos_camera(p, view, level);
-    if (p->pixels[view] == NULL) {
-        image full = {0}, small = {0};
-        drop_level_kept_until_next(p);
-        gbt_status status = get_full(p, view, &full, err);
-        if (status == GBT_OK)
-            status = photo_resize(&full, camera.width, camera.height, &small, err);
-        if (status == GBT_OK)
-            status = resize_valid(p, view, &camera, err);
-        if (status == GBT_OK)
-            status = to_bytes(&small, &p->pixels[view], err);
-        image_free(&full);
-        image_free(&small);
-        GBT_TRY(status);
-        count_level(p, view);
-    }
-    GBT_TRY(image_fit(out, camera.width, camera.height, 3, err));
-    from_bytes(p->pixels[view], out);
+    image full = {0};
+    gbt_status status = get_full(p, view, &full, err);
+    image_free(out);
+    if (status == GBT_OK)
+        status = photo_resize(&full, camera.width, camera.height, out, err);
+    if (status == GBT_OK && p->full_valid[view] != NULL)
+        status = photo_resize_valid(p->full_valid[view], full.width, full.height, camera.width, camera.height,
+                                    &p->some_valid, err);
+    image_free(&full);
+    return status;
+}
+
+gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsigned char **valid,
+                      gbt_error *err)
+{
+    mem_free(p->some_valid);
+    p->some_valid = NULL;
+    GBT_TRY(level == 0 ? get_full(p, view, out, err) : get_smaller(p, view, level, out, err));
+    if (valid != NULL)
+        *valid = level == 0 ? p->full_valid[view] : p->some_valid;
     return GBT_OK;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photos.h -- the training photos, kept as 8 bit as far as memory allows; whole, smaller, every n-th
-   pixel of them, or a part. */
+/* train/photos.h -- the training photos, kept as 8 bit as far as memory allows; whole, smaller, or every n-th
+   pixel of them. */
 #ifndef GBT_TRAIN_PHOTOS_H
 #define GBT_TRAIN_PHOTOS_H
 
@@ -12,32 +12,24 @@
 typedef struct photos {
     const scene *source; /* borrowed */
     double downscale;
-    size_t bytes_max; /* of photos that are kept, at level 0 and `level`; the others are made whenever they
-                         are asked for */
-    size_t bytes;     /* of those that are */
+    size_t bytes_max;       /* of photos that are kept; the others are read whenever they are asked for */
+    size_t bytes;           /* of those that are */
     size_t kept_until_next; /* a view whose photo stays until the next that finds no room; SIZE_MAX: none */
-    int level;
-    size_t level_bytes;           /* of `bytes`, at `level` > 0 */
-    size_t level_kept_until_next; /* as `kept_until_next`, at `level` > 0 */
     size_t decoded_max;   /* bytes that photos take while they are decoded at once; 0: a quarter of the memory
                              that is free */
-    unsigned char **full; /* [view_count] at level 0, NULL until asked for */
-    unsigned char **pixels; /* [view_count] at `level` > 0, made from `full` */
-    unsigned char **full_valid,
-        **valid; /* [view_count] marks of the same pixels; NULL for a photo whose values are all finite */
-    unsigned char **transparency; /* [view_count] how transparent each pixel at level 0 is, 255: wholly; NULL
-                                     for a photo that is opaque, or whose alpha channel is a mask */
-    unsigned char *sample_valid;  /* of the last photos_get_sample(), when it picked pixels */
-    size_t sample_valid_capacity;
+    unsigned char **full; /* [view_count] NULL until asked for */
+    unsigned char **full_valid; /* [view_count] marks of the same pixels: 0 where a value was not finite; NULL
+                                   for a photo whose values are all finite */
+    unsigned char **transparency; /* [view_count] how transparent each of them is, 255: wholly; NULL for a
+                                     photo that is opaque, or whose alpha channel is a mask */
+    unsigned char *some_valid;    /* of the last photo that was asked for smaller, or in every n-th pixel */
 } photos;
 
 /** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`
-    on; or at level 0 one of parts x parts equal parts. {0}: all. */
+    on. {0}: all. */
 typedef struct photo_sample {
     int level;             /* >= 0 */
     int phase[2];          /* x, y, [0, 2^level) */
-    int parts;             /* 0 and 1: whole */
-    int part[2];           /* x, y, [0, parts) */
     const float *backdrop; /* [3]: a colour behind what is transparent; NULL: that of scene_view.alpha */
 } photo_sample;
 
@@ -80,30 +72,28 @@ gbt_camera photo_camera_divided(const gbt_camera *stated, double divide);
 /** Camera of a view at a level: divided by downscale 2^level. */
 gbt_camera photos_camera(const photos *p, size_t view, int level);
 
-/** A photo as float at a level; asking for another level drops what is kept. `out` is resized as needed
-    (start from {0}). */
-gbt_status photos_get(photos *p, size_t view, int level, image *out, gbt_error *err);
+/**
+ * A photo as float at a level: above 0 area means, made anew by each call.
+ *
+ * @param out   [out] resized as needed (start from {0})
+ * @param valid [out] optional: which of its pixels mean something, 0: a value below was not finite; NULL: all
+ *                    do. Borrowed until the next call.
+ */
+gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsigned char **valid,
+                      gbt_error *err);
 
 /**
  * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the
  * photo at full size through the middle of these pixels.
  *
- * Where the lens model has no principal point to shift (equirectangular), photo and camera are those of the
- * level instead, and whole. Parts overlap where the size is no multiple of their number.
- * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase, and
- *                     for every part
- * @param valid  [out] as photos_valid(), of these pixels; borrowed until the next call
- * @param step   [out] how many of the photo's pixels lie from one pixel of `camera` to the next: 2^level, or
- *                     1 for a smaller photo
+ * @param sample [in]  of a photo that has 2^level pixels each way, or more
+ * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase
+ * @param valid  [out] as photos_get() has them; borrowed until the next call
  */
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,
-                             gbt_camera *camera, const unsigned char **valid, int *step, gbt_error *err);
+                             gbt_camera *camera, const unsigned char **valid, gbt_error *err);
 
 /** Whether some pixel of these photos means something: reads them at full size until one is found. */
 gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *any, gbt_error *err);
-
-/** Which pixels of the photo that photos_get() gave last for this view mean something: 0 where a value was
-    not finite; NULL: all. */
-const unsigned char *photos_valid(const photos *p, size_t view);
 
 #endif

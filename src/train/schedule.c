@@ -97,18 +97,10 @@ double schedule_rate_end(double views) { return fmin(fmax(sqrt(4000 / fmax(views
 
 float schedule_left_out(double looks) { return (float)(1 - pow(100 / fmax(looks, 100), 0.3)); }
 
-/* Progress at which `level` begins. */
-static double level_start(int level, int start_level)
-{
-    if (level >= start_level)
-        return 0;
-    return level == 0 ? SCHEDULE_WHOLE_FROM : 0.3 * ldexp(1, 1 - level);
-}
-
 int schedule_level(double progress, int start_level)
 {
     int level = start_level;
-    while (level > 0 && progress >= level_start(level - 1, start_level))
+    while (level > 1 && progress >= ldexp(0.3, 2 - level))
         level--;
     return level;
 }

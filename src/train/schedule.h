@@ -42,18 +42,15 @@ double pace_progress(const pace *p, uint64_t step);
  */
 double pace_expected(const pace *p, uint64_t step);
 
-/** Before this progress a run by time expects up to twice its final length. */
-#define SCHEDULE_LENGTH_KNOWN 0.25
-
 /** The part that `step` lies in, or p->known when the known parts are used up. */
 int pace_segment(const pace *p, uint64_t step);
 
 /**
  * How many of a photo's pixels a step looks at: 1 in 4^level (train/photos.h).
  *
- * A step teaches nearly as much from a sixteenth of the pixels as from all (docs/training.md), so all of them
- * come last: level 0 from SCHEDULE_WHOLE_FROM on, level 1 from 0.3 on, each coarser one until half of where
- * the finer begins; `start_level` is the first.
+ * A step teaches nearly as much from a sixteenth of the pixels, at random places, as from all
+ * (docs/training.md). `start_level` is the first; level 1 comes from 0.3 on and stays, each coarser one until
+ * half of where the finer begins.
  */
 int schedule_level(double progress, int start_level);
 
@@ -78,16 +75,12 @@ double schedule_rate_end(double views);
 /**
  * The part of the anchors in view that each step until SCHEDULE_EXACT_FROM leaves out at random: 0 up to 100
  * `looks` at each photo, then 1 - (100 / looks)^0.3: 0.28 at 300, 0.5 at 1,000. Looks are those of the whole
- * run, as far as its length is known (pace_expected()); of photos large enough for n parts every step is 1/n
- * look.
+ * run, as far as its length is known (pace_expected()).
  *
  * What looks at its photos so often fits them better than it fits the scene. Anchors that cannot count on
  * each other come to stand where all photos want them (docs/training.md).
  */
 float schedule_left_out(double looks);
-
-/** From here on all pixels. */
-#define SCHEDULE_WHOLE_FROM 0.85
 
 /** From here on the cut-offs and the order of rendering. Before, SCHEDULE_ALPHA_MIN and SCHEDULE_T_MIN, which
     leave half as many hits per ray, and trace_settings.packet_order. */

@@ -340,8 +340,8 @@ static gbt_status read_views(seeding *s, photos *source, const size_t *views, si
         v->camera = photos_camera(source, view, 0);
         while (v->camera.width > SEED_LONG_SIDE || v->camera.height > SEED_LONG_SIDE)
             v->camera = photos_camera(source, view, ++level);
-        GBT_TRY(photos_get(source, view, level, &v->photo, err));
-        const unsigned char *valid = photos_valid(source, view);
+        const unsigned char *valid;
+        GBT_TRY(photos_get(source, view, level, &v->photo, &valid, err));
         const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;
         v->gray = mem_alloc(pixels, sizeof *v->gray, "seed images", err);
         if (v->gray == NULL)

@@ -24,9 +24,9 @@ enum {
  * distance at which most places of 2,000 pixels agree, with a warning if few do. A depth counts by the
  * normalised correlation of 5 x 5 pixels with up to four neighbouring photos, the better half of them. Pixels
  * whose best depth is good and beats all others become points; with few of these, the next best up to 1,000.
- * Pixels that do not count (photos_valid()) are in none of the 5 x 5.
+ * Pixels that do not count (photos_get()) are in none of the 5 x 5.
  *
- * @param source [in]  opened at the training resolution; left at its coarsest level in use
+ * @param source [in]  opened at the training resolution
  * @param out    [in,out] scene_points without points; filled
  * @return GBT_OK, GBT_ERR_FORMAT (fewer views than SEED_VIEWS_LEAST, or they agree nowhere), GBT_ERR_IO,
  *         GBT_ERR_NO_MEMORY

@@ -15,7 +15,6 @@
 #include "train/memory_need.h"
 #include "train/seed_points.h"
 #include "train/seen_points.h"
-#include "train/step_pixels.h"
 
 /* ---- points ---- */
 
@@ -189,17 +188,6 @@ static gbt_status choose_exposure(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
-double setup_photo_steps(const trainer *t)
-{
-    double sum = 0;
-    for (size_t i = 0; i < t->train_count; i++) {
-        const gbt_camera c = photos_camera(&t->photos, t->train_views[i], 0);
-        const int parts = step_pixels_of(&c, &t->rules, 1).parts;
-        sum += (double)parts * parts;
-    }
-    return sum;
-}
-
 gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
@@ -234,7 +222,6 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
         t->scene.views[i].seen = NULL;
         t->scene.views[i].seen_count = 0;
     }
-    t->photo_steps = setup_photo_steps(t);
     t->voxel_size = def->voxel_size;
     if (t->voxel_size > 0)
         return GBT_OK;

@@ -19,7 +19,4 @@
  */
 gbt_status setup_data(trainer *t, const char *data, gbt_error *err);
 
-/** t->photo_steps, by t->rules and the photos, which are set. */
-double setup_photo_steps(const trainer *t);
-
 #endif

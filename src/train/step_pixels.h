@@ -5,20 +5,16 @@
 
 #include "train/rules.h"
 
-/** 1 in 4^level of the pixels, or where that is 0 one of parts x parts parts of the photo. */
-typedef struct step_pixels {
-    int level, parts;
-    double pixels; /* about */
-} step_pixels;
-
 /**
- * The schedule's level at `progress`, and as many more, each a factor of 4, as bring the photo nearest to
- * rules.step_pixels; but never fewer than 80 pixels across. At level 0 parts of about step_pixels; panoramas
- * are whole.
+ * Steps look at 1 in 4^level of the pixels: the schedule's level at `progress`, and as many more as bring the
+ * photo nearest to rules.step_pixels; but never fewer than 80 pixels across.
  *
  * @param camera [in] of the photo, of the size that it is trained at
  */
-step_pixels step_pixels_of(const gbt_camera *camera, const train_rules *rules, double progress);
+int step_level(const gbt_camera *camera, const train_rules *rules, double progress);
+
+/** How many pixels that is, about. */
+double step_pixel_count(const gbt_camera *camera, const train_rules *rules, double progress);
 
 /** What a pixel's ray costs at `progress`, as a multiple of the loose rays' (rules.loose_rays): exact ones
    have twice the hits. */

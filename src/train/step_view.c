@@ -49,35 +49,15 @@ static size_t pick_photo(trainer *t, uint64_t before)
     return t->order[before % t->train_count];
 }
 
-/* Of a photo, at the progress of this step. */
-static step_pixels size_of_step(const trainer *t, size_t view)
-{
-    const gbt_camera camera = photos_camera(&t->photos, view, 0);
-    return step_pixels_of(&camera, &t->rules, pace_progress(&t->pace, t->step));
-}
-
-/* The first of every 2^level-th pixel: at most four places along a side, so that what is known of the lens at
-   these pixels (RAY_LENSES) serves other steps too. */
-static int random_phase(uint32_t word, int level)
-{
-    const int places = level < 2 ? 1 << level : 4, apart = (1 << level) / places;
-    return (int)(word % (uint32_t)places) * apart + apart / 2;
-}
-
-/* Which pixels of the photo: random ones of every 2^level-th; or a part, another one whenever the photo comes
-   up, so that all have their turn. */
-static photo_sample pick_pixels(const trainer *t, step_pixels size, size_t slot, uint64_t before)
+/* Which pixels of the photo: every 2^level-th, at random places. */
+static photo_sample pick_pixels(const trainer *t, size_t view, uint64_t before)
 {
     uint32_t words[4];
+    const gbt_camera camera = photos_camera(&t->photos, view, 0);
+    const int level = step_level(&camera, &t->rules, pace_progress(&t->pace, t->step));
     rng_philox(t->def.seed, RNG_STREAM_PIXELS, before, words);
-    if (size.level > 0)
-        return (photo_sample){
-            .level = size.level,
-            .phase = {random_phase(words[0], size.level), random_phase(words[1], size.level)}};
-    rng_philox(t->def.seed, RNG_STREAM_PARTS, slot, words);
-    const uint64_t parts = (uint64_t)size.parts,
-                   turn = (words[0] + before / t->train_count) % (parts * parts);
-    return (photo_sample){.parts = size.parts, .part = {(int)(turn % parts), (int)(turn / parts)}};
+    return (photo_sample){.level = level,
+                          .phase = {(int)(words[0] % (1u << level)), (int)(words[1] % (1u << level))}};
 }
 
 /* Late in a run every second view of a step has another colour behind it: only what hides it is right on all
@@ -111,12 +91,10 @@ void step_photos_pick(trainer *t)
 static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err)
 {
     const size_t view = t->train_views[v->slot];
-    const step_pixels size = size_of_step(t, view);
     v->frame.draw.chance = (visible_chance){
         .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)RNG_STREAM_LEFT_OUT << 48 | before};
-    v->outcome.level = size.level;
-    v->outcome.parts = size.parts;
-    photo_sample sample = pick_pixels(t, size, v->slot, before);
+    photo_sample sample = pick_pixels(t, view, before);
+    v->frame.draw.pixel_step = 1 << sample.level;
     float backdrop[3];
     if (pick_background(t, before, v->background)) {
         memcpy(backdrop, v->background, sizeof backdrop);
@@ -126,8 +104,7 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
         }
         sample.backdrop = backdrop;
     }
-    GBT_TRY(photos_get_sample(&t->photos, view, &sample, &v->photo, &v->camera, &v->valid,
-                              &v->frame.draw.pixel_step, err));
+    GBT_TRY(photos_get_sample(&t->photos, view, &sample, &v->photo, &v->camera, &v->valid, err));
     v->outcome.width = v->camera.width;
     v->outcome.height = v->camera.height;
     if (v->valid == NULL || t->view_count == 1)
@@ -280,7 +257,6 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     if (t->poses.count > 0)
         GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
     loss_add_gradient(&f->gaussians, volume_weight, &f->d_gaussians);
-    loss_share_gradient(r->parts, &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &t->anchors, &t->decoder, &gradient->anchors, gradient->networks, err));
     char where[80];
     if (gradient_is_bad(gradient, f, &t->decoder, t->exposures.count > 0 ? r->d_exposure : NULL, where,
@@ -297,8 +273,7 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     if (alone)
         return GBT_OK;
     if (growing_gathers(t))
-        growth_stats_gather(&v->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near,
-                            r->parts);
+        growth_stats_gather(&v->stats, f, t->rules.importance, t->rules.gradient_counting, settings.t_near);
     return step_rows_take(t, v, err);
 }
 

@@ -27,7 +27,7 @@ typedef struct view_outcome {
     double d_exposure[AFFINE_NUMBERS]; /* dL/d(colour matrix of its photo), with exposures */
     double d_pose[POSE_NUMBERS];       /* dL/d(motion of its camera), with poses */
     double d_sky[SH_COUNT][3];         /* dL/d(background's coefficients), with a sky */
-    int width, height, level, parts;
+    int width, height;
     uint64_t gaussians, visible, rays, hits, blended;
 } view_outcome;
 

@@ -132,8 +132,6 @@ static void report_views(const trainer *t, step_report *out)
         out->loss = out->l1 = out->ssim = out->psnr = (double)NAN;
     out->width = first->width;
     out->height = first->height;
-    out->level = first->level;
-    out->parts = first->parts;
     for (int i = 0; i < t->def.views; i++) {
         const view_outcome *v = &t->outcomes[i];
         if (!isnan(v->psnr)) {
@@ -187,15 +185,7 @@ static void gather_alone(trainer *t)
 {
     const step_view *v = &t->views[0];
     growth_stats_gather(&t->stats, &v->frame, t->rules.importance, t->rules.gradient_counting,
-                        step_view_near(t, v), v->outcome.parts);
-}
-
-/* How often the whole run looks at each photo, of `all_views` that its steps are expected to look at. Up to
-   SCHEDULE_LENGTH_KNOWN these may be twice too many: half of them count. */
-static double looks_of_run(const trainer *t, double all_views, double progress)
-{
-    const bool by_time = t->def.iterations == 0 || t->def.pace != NULL;
-    return all_views / t->photo_steps * (by_time && progress < SCHEDULE_LENGTH_KNOWN ? 0.5 : 1);
+                        step_view_near(t, v));
 }
 
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
@@ -214,7 +204,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                               .factor = t->def.learning_rate_factor * sqrt(views),
                               .end = schedule_rate_end(all_views),
                               .views = t->def.views});
-    t->left_out = leaves_out ? schedule_left_out(looks_of_run(t, all_views, progress)) : 0;
+    t->left_out = leaves_out ? schedule_left_out(all_views / (double)t->train_count) : 0;
 
     /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));

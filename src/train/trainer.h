@@ -20,12 +20,12 @@
 
 /** What the last step did. */
 typedef struct step_report {
-    double loss, l1, ssim, psnr;     /* means over its views of which a pixel counts; NaN without any */
-    int width, height, level, parts; /* of the first view */
-    size_t gaussians, visible;       /* means over its views */
-    uint64_t rays, hits, blended;    /* of all views */
-    frame_times times;               /* sums over its views, as photo and compare */
-    double beside;                   /* how many views ran at once, in the mean */
+    double loss, l1, ssim, psnr;  /* means over its views of which a pixel counts; NaN without any */
+    int width, height;            /* of the first view */
+    size_t gaussians, visible;    /* means over its views */
+    uint64_t rays, hits, blended; /* of all views */
+    frame_times times;            /* sums over its views, as photo and compare */
+    double beside;                /* how many views ran at once, in the mean */
     stage_time photo, compare, optimizer, adjust, all;
     double wait_seconds, exchange_seconds; /* until all processes had their views; in sending rows */
     uint64_t exchange_bytes;
@@ -40,7 +40,6 @@ struct trainer {
     uint64_t photos_hash, masks_hash; /* checkpoint_hash_photos() */
     size_t *train_views;              /* indices into scene.views */
     size_t train_count, test_count;
-    double photo_steps; /* steps that look once at all pixels of the training photos */
 
     /* What learns; its gradient and its Adam moments have the same shapes. */
     anchors anchors;

@@ -107,8 +107,7 @@ static double halton(int n, int base)
     return value;
 }
 
-/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0, and any of a lens without a
-   principal point, is the camera itself. */
+/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0 is the camera itself. */
 static gbt_camera sample_camera(const gbt_camera *camera, int n)
 {
     gbt_camera shifted = *camera;
@@ -154,13 +153,13 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
 }
 
 /* Which pixels of a photo count, as in scores; `f` holds them. */
-static gbt_status find_marks(const studio *s, size_t view, frame *f, const unsigned char **marks,
-                             gbt_error *err)
+static gbt_status find_marks(const studio *s, size_t view, const unsigned char *valid, frame *f,
+                             const unsigned char **marks, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
     const ray_shot shot = ray_shot_of(&camera);
     GBT_TRY(ray_image_from_shot(&shot, 0, &f->rays, err));
-    return frame_valid(f, photos_valid(&s->run->photos, view), marks, err);
+    return frame_valid(f, valid, marks, err);
 }
 
 gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err)
@@ -169,11 +168,11 @@ gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *
     picture_times times = {0};
     image photo = {0};
     frame lens = {0}; /* its rays alone */
-    const unsigned char *marks = NULL;
+    const unsigned char *valid, *marks = NULL;
     GBT_TRY(studio_camera(s, what, &camera, err)); /* there is such a view */
-    gbt_status status = photos_get(&s->run->photos, (size_t)what->view, 0, &photo, err);
+    gbt_status status = photos_get(&s->run->photos, (size_t)what->view, 0, &photo, &valid, err);
     if (status == GBT_OK && what->format == REQUEST_RAW)
-        status = find_marks(s, (size_t)what->view, &lens, &marks, err);
+        status = find_marks(s, (size_t)what->view, valid, &lens, &marks, err);
     if (status == GBT_OK)
         status = finish(s, &photo, what, &times, out, err);
     for (size_t i = 0; status == GBT_OK && marks != NULL && i < out->count / 4; i++)

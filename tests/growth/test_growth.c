@@ -854,7 +854,7 @@ static void gradients_are_of_what_is_in_view(void **state)
     f.tape.slot = slot;
     f.tape.opacity_sum = opacity_sum;
     for (int twice = 0; twice < 2; twice++)
-        growth_stats_gather(&s, &f, GROWTH_BY_OPACITY, GROWTH_COUNT_IN_CONE, 0.2f, 1);
+        growth_stats_gather(&s, &f, GROWTH_BY_OPACITY, GROWTH_COUNT_IN_CONE, 0.2f);
     for (size_t i = 0; i < COUNT; i++) {
         const size_t row = COUNT - 1 - i;
         assert_true(s.grad_count[row] == (cases[i].counts ? 2.0f : 0.0f));

@@ -56,12 +56,11 @@ typedef struct gathered {
     growth_stats s;
 } gathered;
 
-/* Of a photo, or of one of its parts x parts parts, whose loss is its share of the photo's. */
-static void gather(const lens_case *c, int parts, const anchors *a, const decoder *d,
-                   growth_counting counting, gathered *g)
+static void gather(const lens_case *c, const anchors *a, const decoder *d, growth_counting counting,
+                   gathered *g)
 {
     gbt_camera camera = c->camera;
-    camera.width = camera.height = SIZE / parts;
+    camera.width = camera.height = SIZE;
     const double turn = c->turned ? -1 : 1, pose[9] = {turn, 0, 0, 0, 1, 0, 0, 0, turn};
     memcpy(camera.rotation, pose, sizeof pose);
     image d_image;
@@ -73,7 +72,7 @@ static void gather(const lens_case *c, int parts, const anchors *a, const decode
         d_image.pixels[i] = 1e-3f;
     assert_ok(frame_backward_gaussians(&g->f, &d_image, NULL));
     assert_ok(growth_stats_resize(&g->s, ANCHORS, OFFSETS, NULL));
-    growth_stats_gather(&g->s, &g->f, GROWTH_BY_SHARE, counting, 0.01f, parts);
+    growth_stats_gather(&g->s, &g->f, GROWTH_BY_SHARE, counting, 0.01f);
     image_free(&d_image);
 }
 
@@ -100,8 +99,8 @@ static void what_rays_blended_is_counted(void **state)
     anchors a = anchors_around();
     decoder d = random_decoder(OFFSETS, false, 7);
     gathered by_rays, in_cone;
-    gather(c, 1, &a, &d, GROWTH_COUNT_BLENDED, &by_rays);
-    gather(c, 1, &a, &d, GROWTH_COUNT_IN_CONE, &in_cone);
+    gather(c, &a, &d, GROWTH_COUNT_BLENDED, &by_rays);
+    gather(c, &a, &d, GROWTH_COUNT_IN_CONE, &in_cone);
     const frame *f = &by_rays.f;
     double outer = 0;
     size_t steep = 0, missed = 0;
@@ -131,7 +130,7 @@ static void a_panorama_has_no_front(void **state)
     decoder d = random_decoder(OFFSETS, false, 7);
     gathered way[2];
     for (int i = 0; i < 2; i++)
-        gather(&cases[CASES - 2 + i], 1, &a, &d, GROWTH_COUNT_BLENDED, &way[i]);
+        gather(&cases[CASES - 2 + i], &a, &d, GROWTH_COUNT_BLENDED, &way[i]);
     for (size_t slot = 0; slot < ANCHORS * OFFSETS; slot++) {
         const double one = (double)way[0].s.grad_accum[slot], other = (double)way[1].s.grad_accum[slot];
         assert_true(fabs(one - other) <= 1e-6 + 1e-3 * one);
@@ -142,56 +141,12 @@ static void a_panorama_has_no_front(void **state)
     decoder_free(&d);
 }
 
-/* What lies in one of four parts of a photo is as important and as steep there as in the whole; but for the
-   few whose pixel is above a cut-off in one and, by rounding, below it in the other. */
-static void a_part_tells_what_the_photo_tells(void **state)
-{
-    (void)state;
-    enum { PARTS = 2 };
-    anchors a = anchors_around();
-    decoder d = random_decoder(OFFSETS, false, 7);
-    gathered whole, part[PARTS * PARTS];
-    gather(&cases[0], 1, &a, &d, GROWTH_COUNT_BLENDED, &whole);
-    for (int i = 0; i < PARTS * PARTS; i++) {
-        lens_case c = cases[0];
-        c.camera.params[2] -= SIZE / PARTS * (i % PARTS);
-        c.camera.params[3] -= SIZE / PARTS * (i / PARTS);
-        gather(&c, PARTS, &a, &d, GROWTH_COUNT_BLENDED, &part[i]);
-    }
-    size_t steep = 0, large = 0, differ = 0;
-    for (size_t anchor = 0; anchor < ANCHORS; anchor++) {
-        double importance = 0, shown = 0;
-        for (int i = 0; i < PARTS * PARTS; i++) {
-            importance += (double)part[i].s.importance_accum[anchor];
-            shown += (double)part[i].s.shown_count[anchor];
-        }
-        const double in_whole = (double)whole.s.importance_accum[anchor];
-        assert_true(fabs(importance - in_whole) <= 1e-6 + 2e-2 * in_whole);
-        large += in_whole > 1e-5;
-        for (size_t slot = anchor * OFFSETS; shown == 1 && slot < (anchor + 1) * OFFSETS; slot++) {
-            double gradient = 0;
-            for (int i = 0; i < PARTS * PARTS; i++)
-                gradient += (double)part[i].s.grad_accum[slot];
-            const double of_whole = (double)whole.s.grad_accum[slot];
-            differ += fabs(gradient - of_whole) > 1e-6 + 1e-2 * of_whole;
-            steep += of_whole > 1e-5;
-        }
-    }
-    assert_true(steep > 20 && large > 20 && differ <= 2);
-    for (int i = 0; i < PARTS * PARTS; i++)
-        free_gathered(&part[i]);
-    free_gathered(&whole);
-    anchors_free(&a);
-    decoder_free(&d);
-}
-
 int main(void)
 {
-    struct CMUnitTest tests[CASES + 2];
+    struct CMUnitTest tests[CASES + 1];
     for (size_t i = 0; i < CASES; i++)
         tests[i] = (struct CMUnitTest){
             .name = cases[i].name, .test_func = what_rays_blended_is_counted, .initial_state = &cases[i]};
     tests[CASES] = (struct CMUnitTest)cmocka_unit_test(a_panorama_has_no_front);
-    tests[CASES + 1] = (struct CMUnitTest)cmocka_unit_test(a_part_tells_what_the_photo_tells);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

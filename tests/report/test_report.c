@@ -242,7 +242,10 @@ static void whole_page(void **state)
 {
     (void)state;
     write_pictures();
-    write_log(50, "");
+    /* ends with a score of held-out photos, which are seen at full size */
+    write_log(
+        50,
+        "500,50.6,0.1,480,360,0.01,0.1,0.5,24,24,1050,5350,300,20.5,405000,1000,1,2,3,4,5,6,7,8,9,10,11\n");
     evaluation e = make_views(3);
     strcpy(e.views[1].name, "<img src=x onerror='a'>&\"\xff\x01.jpg");
     json_t *metrics = full_metrics();
@@ -292,6 +295,8 @@ static void whole_page(void **state)
         if (occurrences(page, wanted[i].text) < wanted[i].least)
             fail_msg("\"%s\": %zu times, wanted %zu", wanted[i].text, occurrences(page, wanted[i].text),
                      wanted[i].least);
+    assert_null(strstr(page, "480\xc3\x97"
+                             "360 px")); /* no step had that */
     assert_null(strstr(page, "<img src=x"));
     assert_null(strstr(page, "<script>alert"));
     assert_null(strstr(page, "class=\"none\""));

@@ -73,6 +73,10 @@ def lenses_and_outputs(page):
         page.run(f"(e => {{ e.value = '{lens}'; e.dispatchEvent(new Event('change')); }})(document.getElementById('model'))")
         page.wait(STILL)
         check(lens, page.run("document.getElementById('message').hidden && gbtrace.camera.model") == lens)
+        page.run("document.getElementById('samples').value = '4'; gbtrace.changed()")
+        page.wait(f"{STILL} && gbtrace.look.done.samples === 4")
+        page.run("document.getElementById('samples').value = '1'; gbtrace.changed()")
+        page.wait(f"{STILL} && gbtrace.look.done.samples === 1")
     for output in ("depth", "normal", "transmittance", "hits", "anchor", "color"):
         choose(page, "output", output)
         page.wait(f"{STILL} && gbtrace.look.done.output === '{output}'")

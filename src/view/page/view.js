@@ -110,7 +110,7 @@ function wanted() {
             q.set("background", byId("background").value);
         return q;
     };
-    const samples = color && camera.model !== "equirectangular" && byId("live").hidden ? Number(byId("samples").value) : 1;
+    const samples = color && byId("live").hidden ? Number(byId("samples").value) : 1;
     const small = byId("moving").value === "auto", bounded = small && alone && (look.view < 0 || byId("size").value === "window");
     return { query, output, width, height, samples, small, bounded, shot: camera.file(width, height) };
 }

@@ -43,7 +43,8 @@ typedef struct gbt_train_def {
                     2 % of the median distance of anchors, which is what counts where points have no tracks.
                     A photo whose points are nearer than that has its own. 0 with compat */
     int start_level; /* first steps look at 1 pixel in 4^start_level, at random places, later ones at 1 in 4;
-                        0: at all. Of photos above 2^19 pixels at fewer. 0 with compat, at all of any */
+                        0: at all. Of photos below 100,000 pixels at 4 times as many, of those above 2^19 at
+                        fewer. 0 with compat, at all of any */
     const char *eval_split; /* held-out photos: "auto" (as the data set says, else every=8), "every=N",
                                "every=N:K" (photos K, K + N, ... of the sorted list; K is 0 without), "none",
                                "list=FILE". "validate=N:K," before it, for choosing constants: these are not

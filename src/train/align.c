@@ -26,7 +26,7 @@ static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_
     return step_view_compare(v, valid, exposed ? matrix : NULL, &loss, unused, err);
 }
 
-/* The finest level that has no more pixels than photos of which training picks from all levels. */
+/* The finest level of about half a megapixel at most. */
 static int finest_level(const trainer *t, size_t view)
 {
     for (int level = 0;; level++) {

@@ -5,13 +5,14 @@
 #include <math.h>
 
 #include "train/photos.h"
+#include "train/rules.h"
 #include "train/seed_points.h"
 #include "train/seen_points.h"
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
                     tree_bytes = 100, tree_fixed_bytes = 95, learning_point_bytes = 3000,
-                    model_point_bytes = 600, score_pixel_bytes = 120;
+                    model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120;
 static const double saved_point_bytes = 952; /* of the copy that a save beside the steps is written from */
 static const double found_points = 20000,    /* by photo consistency, where the data set has none */
     most_points = 131072; /* the tree of balls is 18 deep: more points make no more anchors */
@@ -41,7 +42,8 @@ memory_need memory_need_of(const scene *s, double downscale)
         .decoding = fmax(decoded * (double)photos_at_once(s, 0), decoded + seeding),
         .photos = fmin(train_bytes, (double)PHOTOS_KEPT_BYTES),
         .anchors = (learning_point_bytes + saved_point_bytes) * learning,
-        .view = score_pixel_bytes * largest, /* steps look at a quarter of the pixels or fewer */
+        .view = fmax(score_pixel_bytes * largest, /* of larger photos a step looks at a quarter at most */
+                     step_pixel_bytes * fmin(largest, TRAIN_SMALL_PHOTO)),
     };
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */
         starting = need.points + need.photos + fmax(need.decoding, need.trees),

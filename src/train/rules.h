@@ -13,6 +13,8 @@
 /** Of photos with more pixels steps look at fewer of them (step_pixels.h). The schedule was chosen on photos
    of 320 x 480 to 360 x 640. */
 #define TRAIN_STEP_PIXELS 262144.0
+/** Of photos with fewer pixels, at more of them, which costs little. */
+#define TRAIN_SMALL_PHOTO 100000.0
 
 typedef struct train_rules {
     /* settings that are left open, or decided */

@@ -9,12 +9,13 @@ enum { LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */ };
 int step_level(const gbt_camera *camera, const train_rules *rules, double progress)
 {
     const int across = camera->width < camera->height ? camera->width : camera->height;
-    int level = schedule_level(progress, rules->start_level);
-    for (double left = (double)camera->width * camera->height / rules->step_pixels; left > 2; left /= 4)
+    const double all = (double)camera->width * camera->height;
+    int level = schedule_level(progress, rules->start_level) - (all < TRAIN_SMALL_PHOTO);
+    for (double left = all / rules->step_pixels; left > 2; left /= 4)
         level++;
     while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
         level--;
-    return level;
+    return level > 0 ? level : 0;
 }
 
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules, double progress)

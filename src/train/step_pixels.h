@@ -7,7 +7,8 @@
 
 /**
  * Steps look at 1 in 4^level of the pixels: the schedule's level at `progress`, and as many more as bring the
- * photo nearest to rules.step_pixels; but never fewer than 80 pixels across.
+ * photo nearest to rules.step_pixels, or one less below TRAIN_SMALL_PHOTO; but never fewer than 80 pixels
+ * across.
  *
  * @param camera [in] of the photo, of the size that it is trained at
  */

@@ -65,7 +65,7 @@ take() { # NAME: its photos
 }
 make plain "$points"
 take plain
-make square "$points" 160 # so large that steps pick pixels
+make square "$points" 320 # so large that steps pick pixels
 take square
 make bent "$points\"k1\": -0.12, \"k2\": 0.03, \"p1\": 0.002, \"p2\": -0.001, "
 make fisheye "$points\"camera_model\": \"OPENCV_FISHEYE\", "

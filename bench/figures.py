@@ -5,9 +5,9 @@
 #     python3 bench/figures.py PHOTOS -o DIR [--gbtrace build/release/gbtrace]
 #
 # PHOTOS holds the data sets plush, fox, castle and aerial. The demo and, for each data set, runs of 42 and 84 seconds by three seeds go into
-# DIR; a run that is already there is not repeated. Then docs/figures.txt is written, a line for each figure: a page, a colon and what the page must say, as
-# the test `figures` checks; and the screenshots in docs/images, if bench/viewers has installed its browser packages. Pages are edited by
-# hand. About 30 minutes of two cores.
+# DIR; a run that is already there is not repeated. Then docs/figures.txt is written, a line for each figure: a page, a colon and what the
+# page must say, as the test `figures` checks; and the screenshots in docs/images, if bench/viewers has installed its browser packages.
+# Pages are edited by hand. About 30 minutes of two cores.
 import argparse
 import csv
 import json

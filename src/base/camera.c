@@ -63,16 +63,14 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)
     const double by_x = (double)width / camera->width, by_y = (double)height / camera->height;
     out.width = width;
     out.height = height;
+    const int center = camera_center_at(camera->model);
     if (focal_count == 1) {
         /* Rounding a size to whole pixels makes the two ratios differ a little; the mean halves the error. */
         out.params[0] *= 0.5 * (by_x + by_y);
-        out.params[1] *= by_x;
-        out.params[2] *= by_y;
-        return out;
+    } else {
+        out.params[0] *= by_x;
+        out.params[1] *= by_y;
     }
-    const int center = camera_center_at(camera->model);
-    out.params[0] *= by_x;
-    out.params[1] *= by_y;
     out.params[center] *= by_x;
     out.params[center + 1] *= by_y;
     return out;

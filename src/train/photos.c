@@ -327,24 +327,28 @@ static gbt_status get_smaller(photos *p, size_t view, int level, image *out, gbt
 {
     const gbt_camera camera = photos_camera(p, view, level);
     image full = {0};
+    unsigned char *marks = NULL;
     gbt_status status = get_full(p, view, &full, err);
     image_free(out);
     if (status == GBT_OK)
         status = photo_resize(&full, camera.width, camera.height, out, err);
     if (status == GBT_OK && p->full_valid[view] != NULL)
         status = photo_resize_valid(p->full_valid[view], full.width, full.height, camera.width, camera.height,
-                                    &p->some_valid, err);
+                                    &marks, err);
     image_free(&full);
+    if (marks != NULL) {
+        mem_free(p->some_valid);
+        p->some_valid = marks;
+        p->some_valid_capacity = (size_t)camera.width * (size_t)camera.height;
+    }
     return status;
 }
 
 gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsigned char **valid,
                       gbt_error *err)
 {
-    mem_free(p->some_valid);
-    p->some_valid = NULL;
     GBT_TRY(level == 0 ? get_full(p, view, out, err) : get_smaller(p, view, level, out, err));
     if (valid != NULL)
-        *valid = level == 0 ? p->full_valid[view] : p->some_valid;
+        *valid = level > 0 && p->full_valid[view] != NULL ? p->some_valid : p->full_valid[view];
     return GBT_OK;
 }

@@ -23,6 +23,7 @@ typedef struct photos {
     unsigned char **transparency; /* [view_count] how transparent each of them is, 255: wholly; NULL for a
                                      photo that is opaque, or whose alpha channel is a mask */
     unsigned char *some_valid;    /* of the last photo that was asked for smaller, or in every n-th pixel */
+    size_t some_valid_capacity;
 } photos;
 
 /** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`

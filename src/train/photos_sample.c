@@ -21,14 +21,11 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
         change[c] = sample->backdrop[c] - behind;
     photo_pick_pixels(p->full[view], full.width, &pick,
                       sample->backdrop != NULL ? p->transparency[view] : NULL, change, out);
-    mem_free(p->some_valid);
-    p->some_valid = NULL;
     *valid = NULL;
     if (p->full_valid[view] == NULL)
         return GBT_OK;
-    p->some_valid = mem_alloc((size_t)out->width * (size_t)out->height, 1, "valid pixels", err);
-    if (p->some_valid == NULL)
-        return GBT_ERR_NO_MEMORY;
+    GBT_TRY(mem_reserve((void **)&p->some_valid, &p->some_valid_capacity, 0,
+                        (size_t)out->width * (size_t)out->height, 1, "valid pixels", err));
     photo_pick_marks(p->full_valid[view], full.width, &pick, out->width, out->height, p->some_valid);
     *valid = p->some_valid;
     return GBT_OK;

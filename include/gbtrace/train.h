@@ -42,9 +42,9 @@ typedef struct gbt_train_def {
                     sparse points are: of all training photos the least but for one in twenty, and at least
                     2 % of the median distance of anchors, which is what counts where points have no tracks.
                     A photo whose points are nearer than that has its own. 0 with compat */
-    int start_level; /* first steps look at 1 pixel in 4^start_level, at random places, later ones at 1 in 4;
-                        0: at all. Of photos below 100,000 pixels at 4 times as many, of those above 2^19 at
-                        fewer. 0 with compat, at all of any */
+    int step_pixels; /* about how many pixels of its photo a step looks at: every n-th across and down, n
+                        being the rounded square root of the photo's pixels / step_pixels, from others each
+                        time; 0: all. 0 with compat */
     const char *eval_split; /* held-out photos: "auto" (as the data set says, else every=8), "every=N",
                                "every=N:K" (photos K, K + N, ... of the sorted list; K is 0 without), "none",
                                "list=FILE". "validate=N:K," before it, for choosing constants: these are not

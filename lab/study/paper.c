@@ -56,7 +56,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     def.eval_split = s->def.eval_split;
     def.save_every_seconds = 0;
     /* As compat has them: a new default must not make old runs look like others. */
-    def.start_level = 0;
+    def.step_pixels = 0;
     def.splats_until = 0;
     def.footprint = 0;
     def.iterations = s->def.iterations;

@@ -22,11 +22,10 @@ static const double slower_than_avx2[CPU_ISA_COUNT] = {
 /* The mean over a run with a budget, whose parts take equal times: photos of `camera`. */
 static double core_seconds_of_step(const gbt_camera *camera, const train_rules *rules)
 {
+    const double megapixels = step_pixel_count(camera, rules) / 1e6;
     double steps_per_second = 0;
     for (int part = 0; part < PACE_SEGMENTS; part++) {
-        const double progress = (part + 0.5) / PACE_SEGMENTS,
-                     megapixels = step_pixel_count(camera, rules, progress) / 1e6,
-                     hits = step_hits_per_pixel(rules, progress);
+        const double hits = step_hits_per_pixel(rules, (part + 0.5) / PACE_SEGMENTS);
         steps_per_second +=
             1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;
     }

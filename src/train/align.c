@@ -7,7 +7,7 @@
 #include "base/fail.h"
 #include "base/stop_signal.h"
 
-enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60 };
+enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60, MOST_PIXELS = 1 << 19 };
 static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
 
 /* The loss of a view's picture from `camera`, as its exposure shows it: v->d_image. */
@@ -26,12 +26,12 @@ static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_
     return step_view_compare(v, valid, exposed ? matrix : NULL, &loss, unused, err);
 }
 
-/* The finest level of about half a megapixel at most. */
+/* The finest level of at most MOST_PIXELS. */
 static int finest_level(const trainer *t, size_t view)
 {
     for (int level = 0;; level++) {
         const gbt_camera camera = photos_camera(&t->photos, view, level);
-        if ((double)camera.width * camera.height <= 2 * TRAIN_STEP_PIXELS)
+        if ((double)camera.width * camera.height <= MOST_PIXELS)
             return level;
     }
 }

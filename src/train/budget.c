@@ -27,19 +27,18 @@ void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_re
     s->load_seconds += rate * (of_pixels / load - s->load_seconds);
 }
 
-/* Seconds of a step in this part of the schedule: resolutions may change inside the part, and photos have
-   different sizes. */
+/* Seconds of a step in this part of the schedule: exact rays may begin inside it, and photos have different
+   sizes. */
 static double expected_step(const trainer *t, const step_speed *s, int part)
 {
     enum { PLACES = 8 };
     double sum = 0;
     for (size_t v = 0; v < t->train_count; v++) {
         const gbt_camera camera = photos_camera(&t->photos, t->train_views[v], 0);
+        const double pixels = step_pixel_count(&camera, &t->rules);
         for (int i = 0; i < PLACES; i++) {
             const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
-            sum += s->fixed_seconds +
-                   s->load_seconds *
-                       pixel_load(&t->rules, step_pixel_count(&camera, &t->rules, progress), progress);
+            sum += s->fixed_seconds + s->load_seconds * pixel_load(&t->rules, pixels, progress);
         }
     }
     return sum / (double)(PLACES * t->train_count);

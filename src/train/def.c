@@ -67,7 +67,7 @@ void train_def_warn_unused(const gbt_train_def *d)
     } own[] = {{"splats_until", d->splats_until, usual.splats_until},
                {"threshold_factor", d->threshold_factor, usual.threshold_factor},
                {"final_prune_factor", d->final_prune_factor, usual.final_prune_factor},
-               {"start_level", d->start_level, usual.start_level},
+               {"step_pixels", d->step_pixels, usual.step_pixels},
                {"near", d->near, usual.near},
                {"footprint", d->footprint, usual.footprint}};
     char names[256] = "";

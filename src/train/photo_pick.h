@@ -5,9 +5,10 @@
 
 #include "base/image.h"
 
-/** Which pixels: the first, and how far apart they are. */
+/** Which pixels: every step-th across and down. */
 typedef struct photo_pick {
-    int first[2], step;
+    int first[2]; /* x, y, [0, step) */
+    int step;     /* >= 1 */
 } photo_pick;
 
 /**

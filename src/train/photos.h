@@ -5,6 +5,7 @@
 #define GBT_TRAIN_PHOTOS_H
 
 #include "data/scene.h"
+#include "train/photo_pick.h"
 
 /** Bytes of photos that a run keeps at most: half of the memory that is free, and this. */
 #define PHOTOS_KEPT_BYTES ((size_t)1 << 32)
@@ -26,11 +27,9 @@ typedef struct photos {
     size_t some_valid_capacity;
 } photos;
 
-/** Which pixels of a photo a training step looks at: every 2^level-th in both directions, from pixel `phase`
-    on. {0}: all. */
+/** Which pixels of a photo a training step looks at. */
 typedef struct photo_sample {
-    int level;             /* >= 0 */
-    int phase[2];          /* x, y, [0, 2^level) */
+    photo_pick pick;
     const float *backdrop; /* [3]: a colour behind what is transparent; NULL: that of scene_view.alpha */
 } photo_sample;
 
@@ -87,8 +86,9 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsig
  * Pixels picked from a photo, not averaged, and the camera whose pixels they are: its rays are those of the
  * photo at full size through the middle of these pixels.
  *
- * @param sample [in]  of a photo that has 2^level pixels each way, or more
- * @param camera [out] may be smaller than the photo / 2^level by a pixel: the same size for every phase
+ * @param sample [in]  of a photo that has pick.step pixels each way, or more
+ * @param camera [out] may be smaller than the photo / pick.step by a pixel: the same size for every
+ * pick.first
  * @param valid  [out] as photos_get() has them; borrowed until the next call
  */
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,

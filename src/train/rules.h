@@ -10,12 +10,6 @@
 #include "growth/statistics.h"
 #include "train/schedule.h"
 
-/** Of photos with more pixels steps look at fewer of them (step_pixels.h). The schedule was chosen on photos
-   of 320 x 480 to 360 x 640. */
-#define TRAIN_STEP_PIXELS 262144.0
-/** Of photos with fewer pixels, at more of them, which costs little. */
-#define TRAIN_SMALL_PHOTO 100000.0
-
 typedef struct train_rules {
     /* settings that are left open, or decided */
     int offsets;                                    /* Gaussians per anchor */
@@ -48,8 +42,7 @@ typedef struct train_rules {
     bool counts_from_one;  /* rates and growth go by the progress after a step, and growth leaves
                               out its first and last one; else by the progress before it */
     bool last_step_learns; /* else nothing changes in the last step of a run */
-    int start_level;       /* first steps look at 1 pixel in 4^this, later ones at 1 in 4; 0: at all */
-    double step_pixels;    /* of larger photos steps look at as many as of one of this size */
+    double step_pixels;    /* a step looks at about as many of a photo's; infinite: at all */
     double splats_until;   /* part of the run in which splats stand for rays */
     bool loose_rays;       /* SCHEDULE_ALPHA_MIN, SCHEDULE_T_MIN and one order for each packet of rays until
                               SCHEDULE_EXACT_FROM */

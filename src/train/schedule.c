@@ -96,11 +96,3 @@ float schedule_threshold_factor(double views)
 double schedule_rate_end(double views) { return fmin(fmax(sqrt(4000 / fmax(views, 1)), 0.1), 1); }
 
 float schedule_left_out(double looks) { return (float)(1 - pow(100 / fmax(looks, 100), 0.3)); }
-
-int schedule_level(double progress, int start_level)
-{
-    int level = start_level;
-    while (level > 1 && progress >= ldexp(0.3, 2 - level))
-        level--;
-    return level;
-}

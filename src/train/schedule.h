@@ -46,15 +46,6 @@ double pace_expected(const pace *p, uint64_t step);
 int pace_segment(const pace *p, uint64_t step);
 
 /**
- * How many of a photo's pixels a step looks at: 1 in 4^level (train/photos.h).
- *
- * A step teaches nearly as much from a sixteenth of the pixels, at random places, as from all
- * (docs/training.md). `start_level` is the first; level 1 comes from 0.3 on and stays, each coarser one until
- * half of where the finer begins.
- */
-int schedule_level(double progress, int start_level);
-
-/**
  * How much an anchor must bring, (0, 1]: what growth and pruning ask of it is multiplied by this.
  *
  * A long run has the steps to teach more anchors: 1 up to 1000 views, then falling with their square root,

@@ -68,9 +68,8 @@ static const gbt_train_setting settings[] = {
     {NAMED("near", near), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
      .help = "near clipping distance, as a fraction of the nearest depth at which the photos see sparse "
              "points; at least 2 % of the median distance, but for a photo with nearer points of its own"},
-    {NAMED("start-level", start_level), RANGE(INT, 0, 4, "L"), .number = 2, .saved = true, .rare = true,
-     .help = "start by training on one random pixel in 4^L, later on one in 4 (on more of "
-             "small photos, on fewer of large ones)"},
+    {NAMED("step-pixels", step_pixels), RANGE(INT, 0, 1e9, "N"), .number = 50000, .saved = true, .rare = true,
+     .help = "about how many pixels of its photo a step looks at, others each time; 0: all"},
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",
      .choices = "auto|every=8|none|validate=8", .saved = true,
      .help = "held-out photos: auto (as the data set says, else every=8), every=N, every=N:K (from photo K "

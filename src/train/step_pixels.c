@@ -1,26 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_pixels.c -- the schedule's resolution, for a photo of any size. */
+/* train/step_pixels.c -- which part of a photo's pixels a training step looks at. */
 #include "train/step_pixels.h"
 
 #include <math.h>
 
-enum { LEAST_PIXELS_ACROSS = 80 /* with fewer a step would not be faster */ };
-
-int step_level(const gbt_camera *camera, const train_rules *rules, double progress)
+int step_spacing(const gbt_camera *camera, const train_rules *rules)
 {
-    const int across = camera->width < camera->height ? camera->width : camera->height;
-    const double all = (double)camera->width * camera->height;
-    int level = schedule_level(progress, rules->start_level) - (all < TRAIN_SMALL_PHOTO);
-    for (double left = all / rules->step_pixels; left > 2; left /= 4)
-        level++;
-    while (level > 0 && across >> level < LEAST_PIXELS_ACROSS)
-        level--;
-    return level > 0 ? level : 0;
+    const double times = (double)camera->width * camera->height / rules->step_pixels;
+    const int smaller = camera->width < camera->height ? camera->width : camera->height;
+    return (int)fmin(fmax(floor(sqrt(times) + 0.5), 1), smaller);
 }
 
-double step_pixel_count(const gbt_camera *camera, const train_rules *rules, double progress)
+double step_pixel_count(const gbt_camera *camera, const train_rules *rules)
 {
-    return ldexp((double)camera->width * camera->height, -2 * step_level(camera, rules, progress));
+    const double spacing = step_spacing(camera, rules);
+    return (double)camera->width * camera->height / (spacing * spacing);
 }
 
 double step_hits_per_pixel(const train_rules *rules, double progress)

@@ -6,16 +6,15 @@
 #include "train/rules.h"
 
 /**
- * Steps look at 1 in 4^level of the pixels: the schedule's level at `progress`, and as many more as bring the
- * photo nearest to rules.step_pixels, or one less below TRAIN_SMALL_PHOTO; but never fewer than 80 pixels
- * across.
+ * Steps look at every n-th pixel across and down: at about rules.step_pixels, or at all of a photo that is
+ * not much larger. Returned is n, at least 1.
  *
  * @param camera [in] of the photo, of the size that it is trained at
  */
-int step_level(const gbt_camera *camera, const train_rules *rules, double progress);
+int step_spacing(const gbt_camera *camera, const train_rules *rules);
 
 /** How many pixels that is, about. */
-double step_pixel_count(const gbt_camera *camera, const train_rules *rules, double progress);
+double step_pixel_count(const gbt_camera *camera, const train_rules *rules);
 
 /** What a pixel's ray costs at `progress`, as a multiple of the loose rays' (rules.loose_rays): exact ones
    have twice the hits. */

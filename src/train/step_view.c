@@ -49,15 +49,15 @@ static size_t pick_photo(trainer *t, uint64_t before)
     return t->order[before % t->train_count];
 }
 
-/* Which pixels of the photo: every 2^level-th, at random places. */
-static photo_sample pick_pixels(const trainer *t, size_t view, uint64_t before)
+/* Which pixels of the photo, at random. */
+static photo_pick pick_pixels(const trainer *t, size_t view, uint64_t before)
 {
     uint32_t words[4];
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
-    const int level = step_level(&camera, &t->rules, pace_progress(&t->pace, t->step));
+    const int step = step_spacing(&camera, &t->rules);
     rng_philox(t->def.seed, RNG_STREAM_PIXELS, before, words);
-    return (photo_sample){.level = level,
-                          .phase = {(int)(words[0] % (1u << level)), (int)(words[1] % (1u << level))}};
+    return (photo_pick){.first = {(int)(words[0] % (unsigned)step), (int)(words[1] % (unsigned)step)},
+                        .step = step};
 }
 
 /* Late in a run every second view of a step has another colour behind it: only what hides it is right on all
@@ -93,8 +93,8 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     const size_t view = t->train_views[v->slot];
     v->frame.draw.chance = (visible_chance){
         .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)RNG_STREAM_LEFT_OUT << 48 | before};
-    photo_sample sample = pick_pixels(t, view, before);
-    v->frame.draw.pixel_step = 1 << sample.level;
+    photo_sample sample = {.pick = pick_pixels(t, view, before)};
+    v->frame.draw.pixel_step = sample.pick.step;
     float backdrop[3];
     if (pick_background(t, before, v->background)) {
         memcpy(backdrop, v->background, sizeof backdrop);

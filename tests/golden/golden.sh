@@ -43,30 +43,24 @@ awk 'function random() { state = (state * 16807) % 2147483647; return state / 21
             printf "%s %d %d %d\n", where, 128 + 70 * color[0], 128 + 70 * color[1], 128 + 70 * color[2] >"points.ply"
         }
     }'
-make() { # NAME FIELDS [SIDE]: those of transforms.json beside the pinhole camera's; SIDE: of square photos, which are to be taken, as those of plain
+make() { # NAME FIELDS: those of transforms.json beside the pinhole camera's
     mkdir "$1" "$1/images" && cp points.ply "$1" || exit 1
     for i in 0 1 2 3 4 5 6 7 8; do
-        if [ "$1" = plain ] || [ $# = 3 ]; then : >"$1/images/000$i.png"; else cp plain/images/000$i.png "$1/images" || exit 1; fi
+        if [ "$1" = plain ]; then : >"$1/images/000$i.png"; else cp plain/images/000$i.png "$1/images" || exit 1; fi
         # OpenGL axes: right (-s, c, 0), up (0, 0, 1), back (c, s, 0), at 4 times back
-        awk -v i=$i -v fields="$2" -v side="${3:-0}" 'BEGIN {
-            w = side > 0 ? side : 96; h = side > 0 ? side : 72
+        awk -v i=$i -v fields="$2" 'BEGIN {
             c = cos(0.7 * i); s = sin(0.7 * i)
-            if (i == 0) printf "{\"fl_x\": 90, \"fl_y\": 90, \"cx\": %d, \"cy\": %d, \"w\": %d, \"h\": %d, %s\"frames\": [\n", w / 2, h / 2, w, h, fields
+            if (i == 0) printf "{\"fl_x\": 90, \"fl_y\": 90, \"cx\": 48, \"cy\": 36, \"w\": 96, \"h\": 72, %s\"frames\": [\n", fields
             printf "{\"file_path\": \"images/%04d.png\", \"transform_matrix\": [[%.9g,0,%.9g,%.9g],[%.9g,0,%.9g,%.9g],[0,1,0,0.5],[0,0,0,1]]}%s\n",
                 i, -s, c, 4 * c, c, s, 4 * s, i < 8 ? "," : "]}"
         }'
     done >"$1/transforms.json"
 }
 points='"ply_file_path": "points.ply", '
-take() { # NAME: its photos
-    "$program" render gaussians.ply -o photos --data "$1" --split all --quiet >out 2>&1 || { cat out; exit 1; }
-    for photo in photos/*.png; do mv "$photo" "$1/images/${photo##*images_}" || exit 1; done
-    rm -r photos
-}
 make plain "$points"
-take plain
-make square "$points" 320 # so large that steps pick pixels
-take square
+"$program" render gaussians.ply -o photos --data plain --split all --quiet >out 2>&1 || { cat out; exit 1; }
+for photo in photos/*.png; do mv "$photo" "plain/images/${photo##*images_}" || exit 1; done
+rm -r photos
 make bent "$points\"k1\": -0.12, \"k2\": 0.03, \"p1\": 0.002, \"p2\": -0.001, "
 make fisheye "$points\"camera_model\": \"OPENCV_FISHEYE\", "
 make masked "$points" && mkdir masked/masks || exit 1
@@ -99,7 +93,7 @@ run fisheye-run fisheye
 run bent-run bent
 run rolling-run rolling
 run pointless-run pointless
-run picked square
+run picked plain --step-pixels 768 # every third across and down
 run sky plain --background sky --views 2
 run poses plain --refine-poses --exposure --views 2
 steps=1400 # so many looks at each photo that steps leave anchors out
@@ -131,7 +125,7 @@ draw exports/a.ply -o drawn-ply --data plain --format exr
 for init in gb adaptive voxel; do "$program" init plain -o exports/$init.ply --init $init --quiet >out 2>&1 || cat out; done
 
 # ---- compare
-rm -rf plain square bent fisheye masked pointless rolling out gaussians.ply points.ply
+rm -rf plain bent fisheye masked pointless rolling out gaussians.ply points.ply
 for file in $(find . -name '*.exr'); do # they hold the time when they were written
     LC_ALL=C sed -i 's/20[0-9][0-9]:[0-9][0-9]:[0-9][0-9] [0-9][0-9]:[0-9][0-9]:[0-9][0-9]/(the time)/' "$file"
 done

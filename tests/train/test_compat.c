@@ -224,7 +224,7 @@ static void the_other_rules_are_the_references(void **state)
     assert_true(!r->own_adam_age && r->importance == GROWTH_BY_OPACITY && r->shape_log_max == 0.05f);
     assert_true(!r->thresholds_by_length && !r->grows_at_points && !r->needs_two_views);
     assert_true(!t.decoder.has_distance && !r->distance_where_wide);
-    assert_true(r->start_level == 0 && r->splats_until == 0 && !r->loose_rays);
+    assert_true(isinf(r->step_pixels) && r->splats_until == 0 && !r->loose_rays);
     for (int c = 0; c < 3; c++)
         assert_true(t.settings.background[c] == 0);
     trainer_free(&t);

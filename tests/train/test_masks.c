@@ -519,15 +519,15 @@ static void transparent_parts_lie_on_the_colour_asked_for(void **state)
         expected.pixels[i] = alpha * stored.pixels[4 * (i / 3) + i % 3] + (1 - alpha) * backdrop[i % 3];
     }
     for (int white = 0; white < 2; white++)
-        for (int level = 0; level <= 1; level++) {
+        for (int apart = 1; apart <= 2; apart++) {
             scene_set_alpha(&s, white ? GBT_ALPHA_WHITE : GBT_ALPHA_BLACK);
-            const photo_sample sample = {.level = level, .phase = {level, 0}, .backdrop = backdrop};
+            const int x0 = apart - 1;
+            const photo_sample sample = {.pick = {.first = {x0, 0}, .step = apart}, .backdrop = backdrop};
             photos p;
             assert_ok(photos_open(&p, &s, 1, NULL));
             gbt_camera camera;
             const unsigned char *valid;
             assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, NULL));
-            const int apart = 1 << level, x0 = sample.phase[0];
             assert_true(got.width == expected.width / apart && got.height == expected.height / apart);
             for (int y = 0; y < got.height; y++)
                 for (int x = 0; x < got.width; x++)
@@ -554,7 +554,6 @@ static void steps_lay_photos_on_their_background(void **state)
     change_photos(folder, cut_out);
     for (int exposure = 0; exposure < 2; exposure++) {
         gbt_train_def def = run_def();
-        def.start_level = 0;
         def.exposure = exposure;
         def.find_exposure = false; /* it finds some in what the black behind them adds */
         trainer t;

@@ -210,14 +210,14 @@ static void pixels_that_are_not_numbers_are_marked(void **state)
                                      x != POISONED_X >> level || y != POISONED_Y >> level);
         }
     for (int phase = 0; phase < 4; phase++) { /* picked pixels carry their own marks */
-        const photo_sample sample = {.level = 1, .phase = {phase % 2, phase / 2}};
+        const photo_sample sample = {.pick = {.first = {phase % 2, phase / 2}, .step = 2}};
         gbt_camera camera;
         const unsigned char *valid;
         assert_ok(photos_get_sample(&p, POISONED_VIEW, &sample, &photo, &camera, &valid, NULL));
         for (int y = 0; y < photo.height; y++)
             for (int x = 0; x < photo.width; x++)
-                assert_int_equal(valid[y * photo.width + x], 2 * x + sample.phase[0] != POISONED_X ||
-                                                                 2 * y + sample.phase[1] != POISONED_Y);
+                assert_int_equal(valid[y * photo.width + x], 2 * x + sample.pick.first[0] != POISONED_X ||
+                                                                 2 * y + sample.pick.first[1] != POISONED_Y);
     }
     image_free(&photo);
     photos_close(&p);

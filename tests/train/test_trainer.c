@@ -436,7 +436,7 @@ static void a_budget_gives_its_parts_equal_times(void **state)
     def.grow = false;
     trainer t;
     open_ok(&t, tiny, &def);
-    for (size_t i = 0; i < t.scene.view_count; i++) /* large enough for three levels */
+    for (size_t i = 0; i < t.scene.view_count; i++) /* steps look at some of their pixels */
         t.scene.views[i].camera = gbt_camera_resized(&t.scene.views[i].camera, 480, 360);
     const gbt_camera camera = photos_camera(&t.photos, t.train_views[0], 0);
     t.seconds = 0;
@@ -446,10 +446,8 @@ static void a_budget_gives_its_parts_equal_times(void **state)
         budget_extend(&t, &speed);
         for (uint64_t i = 0; i < t.pace.steps[part]; i++, t.step++) {
             const double progress = pace_progress(&t.pace, t.step);
-            const double pixels = step_pixel_count(&camera, &t.rules, progress),
-                         times = t.step % 50 == 49 ? 20 : 1,
-                         of_pixels = times * ldexp(1e-6, step_level(&camera, &t.rules, progress)) * pixels *
-                                     (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
+            const double pixels = step_pixel_count(&camera, &t.rules), times = t.step % 50 == 49 ? 20 : 1,
+                         of_pixels = times * 2e-6 * pixels * (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
             const step_report report = {.width = (int)pixels,
                                         .height = 1,
                                         .beside = 1,
@@ -511,7 +509,6 @@ static void training_learns(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.iterations = 160;
-    def.start_level = 0;
     trainer t;
     open_ok(&t, tiny, &def);
     memset(t.settings.background, 0, sizeof t.settings.background); /* in front of black all that is right has
@@ -1409,24 +1406,9 @@ static learning_rates rates_at(double progress, bool own, double geometry_from, 
                                                    .views = 1});
 }
 
-static void levels_and_rates(void **state)
+static void rates_never_rise(void **state)
 {
     (void)state;
-    for (int start = 0; start <= 4; start++) {
-        int last = start;
-        assert_int_equal(schedule_level(0, start), start);
-        for (int i = 0; i <= 1000; i++) {
-            const int level = schedule_level(i / 1000.0, start);
-            assert_in_range(level, 0, last);
-            last = level;
-        }
-        assert_int_equal(schedule_level(1, start), start > 0);
-        static const double begins[] = {[1] = 0.3, 0.15, 0.075};
-        for (int level = 1; level < start; level++) {
-            assert_int_equal(schedule_level(begins[level] + 1e-9, start), level);
-            assert_int_equal(schedule_level(begins[level] - 1e-9, start), level + 1);
-        }
-    }
     double before[6];
     for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
@@ -1569,7 +1551,7 @@ static void config_comes_back(void **state)
     def.budget_seconds = 1 / 3.0;
     def.pace = "1,2,3";
     def.downscale = 1.1;
-    def.start_level = 1;
+    def.step_pixels = 1234;
     def.eval_split = "list=a = b.txt";
     def.seed = UINT64_MAX;
     def.max_anchors = 77;
@@ -1587,7 +1569,7 @@ static void config_comes_back(void **state)
     config_text(&back, strings.data, again, sizeof again);
     assert_string_equal(text, again);
     assert_true(back.voxel_size == def.voxel_size && back.budget_seconds == def.budget_seconds &&
-                back.seed == UINT64_MAX && !back.grow && back.compat);
+                back.seed == UINT64_MAX && back.step_pixels == 1234 && !back.grow && back.compat);
     assert_true(back.exposure && back.learning_rate_factor == 0.3);
 
     def = gbt_train_def_default();
@@ -1625,7 +1607,7 @@ static void config_comes_back(void **state)
             fail_msg("\"%s\": %s", bad[i].text, err.text);
     }
     static const char *const wild[] = {"max-depth = 1e30\n", "max-depth = nan\n", "offsets = -1e300\n",
-                                       "start-level = inf\n"};
+                                       "step-pixels = inf\n"};
     for (size_t i = 0; i < sizeof wild / sizeof *wild; i++) { /* whole numbers out of range: refused here or
                                                                  where the def is checked */
         err = (gbt_error){0};
@@ -1673,19 +1655,17 @@ static void samples_are_pixels_of_the_photo(void **state)
     assert_ok(photos_get(&p, 0, 0, &full, NULL, NULL));
     const gbt_camera whole = photos_camera(&p, 0, 0);
     size_t seen = 0;
-    for (int level = 0; level <= 2; level++)
-        for (int phase = 0; phase < 1 << 2 * level; phase++) {
-            const photo_sample sample = {.level = level,
-                                         .phase = {phase % (1 << level), phase / (1 << level)}};
+    for (int step = 1; step <= 5; step++)
+        for (int first = 0; first < step * step; first++) {
+            const photo_sample sample = {.pick = {.first = {first % step, first / step}, .step = step}};
             gbt_camera camera;
-            const int step = 1 << level;
             assert_ok(photos_get_sample(&p, 0, &sample, &got, &camera, &valid, NULL));
             assert_null(valid);
             assert_true(got.width == whole.width / step && got.height == whole.height / step);
             assert_true(camera.width == got.width && camera.height == got.height);
             for (int y = 0; y < got.height; y++)
                 for (int x = 0; x < got.width; x++, seen++) {
-                    const int at[2] = {x * step + sample.phase[0], y * step + sample.phase[1]};
+                    const int at[2] = {x * step + sample.pick.first[0], y * step + sample.pick.first[1]};
                     assert_memory_equal(got.pixels + 3 * (y * got.width + x),
                                         full.pixels + 3 * (at[1] * full.width + at[0]), 3 * sizeof(float));
                     double a[3], b[3];
@@ -1695,8 +1675,7 @@ static void samples_are_pixels_of_the_photo(void **state)
                         assert_true(fabs(a[c] - b[c]) < 1e-14);
                 }
         }
-    assert_int_equal(seen, 3 * whole.width * whole.height); /* all of them, once a level: the size is a
-                                                               multiple of 4 */
+    assert_int_equal(seen, 4 * 48 * 36 + 45 * 35); /* each once: 48 and 36 are multiples of 1 to 4 */
     const size_t bad[] = {1, 0};
     mem_free(p.full[0]);
     p.full[0] = NULL;
@@ -1758,20 +1737,14 @@ static void picked_pixels_begin_anywhere(void **state)
     trainer t;
     image whole = {0};
     int seen[4] = {0};
-    gbt_make_scene_def scene_def = gbt_make_scene_def_default();
-    scene_def.width = scene_def.height = 320; /* of smaller photos steps see all pixels */
-    scene_def.view_count = VIEWS;
-    scene_def.points = 150;
-    scene_def.samples = 1;
-    assert_ok(gbt_make_scene(&scene_def, in_folder("square"), NULL));
     gbt_train_def def = run_def();
     def.iterations = 1000;
-    def.start_level = 1;
-    open_ok(&t, in_folder("square"), &def);
+    def.step_pixels = 24 * 18;
+    open_ok(&t, tiny, &def);
     for (; t.step < 10 * t.train_count; t.step++) {
         const step_view *v = pick_ok(&t);
         assert_int_equal(v->frame.draw.pixel_step, 2);
-        assert_true(v->photo.width == 160 && v->photo.height == 160);
+        assert_true(v->photo.width == 24 && v->photo.height == 18);
         assert_ok(photos_get(&t.photos, t.train_views[v->slot], 0, &whole, NULL, NULL));
         int found = 0;
         for (int i = 0; i < 4; i++)
@@ -1835,34 +1808,32 @@ static void photos_keep_to_their_memory(void **state)
     scene_free(&s);
 }
 
-/* A step looks at about as many pixels whatever the photo's size, and at no more in the end. */
+/* A step looks at about as many pixels whatever the photo's size, and at all of a small one. */
 static void steps_keep_to_their_pixels(void **state)
 {
     (void)state;
-    gbt_train_def def = run_def();
-    for (def.start_level = 0; def.start_level <= 2; def.start_level += 2)
-        for (int i = 0; i < 20 * 13; i++) {
-            const train_rules rules = train_rules_of(&def);
-            const double progress = 0.05 * (i % 20);
-            const int width = (int)(560 * pow(1.25, i / 20));
-            const gbt_camera camera = {.width = width, .height = width * 2 / 3};
-            const double pixels = step_pixel_count(&camera, &rules, progress),
-                         all = (double)width * camera.height,
-                         less = exp2(2 * schedule_level(progress, def.start_level));
-            const int level = step_level(&camera, &rules, progress);
-            assert_true(pixels == ldexp(all, -2 * level));
-            assert_true(pixels * less <= 2.3 * rules.step_pixels);
-            if (all <= 2 * rules.step_pixels)
-                assert_int_equal(level, schedule_level(progress, def.start_level));
-            else /* nor at much fewer */
-                assert_true(pixels * less > 0.4 * rules.step_pixels);
-        }
-    const gbt_camera small = {.width = 400, .height = 250}, smaller = {.width = 400, .height = 249};
-    const train_rules rules = train_rules_of(&(gbt_train_def){.start_level = 2});
-    for (int late = 0; late < 2; late++) {
-        assert_int_equal(step_level(&small, &rules, 0.31 * late), 1);
-        assert_int_equal(step_level(&smaller, &rules, 0.31 * late), 1 - late);
+    const gbt_train_def def = gbt_train_def_default();
+    const train_rules rules = train_rules_of(&def);
+    int last = 1;
+    for (int width = 3; width < 12000; width += width / 10 + 1) {
+        const gbt_camera camera = {.width = width, .height = width * 2 / 3};
+        const double all = (double)width * camera.height, pixels = step_pixel_count(&camera, &rules);
+        const int spacing = step_spacing(&camera, &rules);
+        assert_in_range(spacing, last, width / 2);
+        last = spacing;
+        assert_true(fabs(pixels * spacing * spacing - all) < 1e-9 * all);
+        if (all < 2.25 * rules.step_pixels)
+            assert_int_equal(spacing, 1);
+        else
+            assert_true(pixels > 0.56 * rules.step_pixels && pixels < 1.57 * rules.step_pixels);
     }
+    const gbt_camera narrow = {.width = 3, .height = 1000000};
+    assert_int_equal(step_spacing(&narrow, &rules), 3);
+    gbt_train_def compat = def;
+    compat.compat = true;
+    const train_rules reference = train_rules_of(&compat);
+    const gbt_camera large = {.width = 6000, .height = 4000};
+    assert_int_equal(step_spacing(&large, &reference), 1);
 }
 
 static double downscale_to(const scene *s, double width)
@@ -2029,7 +2000,7 @@ int main(int argc, char **argv)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(progress_rises_from_0_to_1),
         cmocka_unit_test(pace_is_read),
-        cmocka_unit_test(levels_and_rates),
+        cmocka_unit_test(rates_never_rise),
         cmocka_unit_test(settings_are_whole),
         cmocka_unit_test(whole_numbers_are_whole),
         cmocka_unit_test(settings_out_of_range_are_named),

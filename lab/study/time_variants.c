@@ -8,7 +8,7 @@
 const time_variant time_variants[] = {
     {"default", "", 1},
     {"faithful protocol, splats", "compat = 1\nrenderer = raster", 5},
-    {"all pixels from the start", "step-pixels = 0", 1},
+    {"all pixels", "step-pixels = 0", 1},
     {"splats first", "splats-until = 0.7", 1},
     {"first scales x 1", "scale-factor = 1", 1},
     {"no growth", "grow = 0", 1},

@@ -85,7 +85,7 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &request.folder,
          .value_name = "DIR",
-         .help = "folder for the tables and the chart",
+         .help = "folder for the tables, and the charts if there are any",
          .required = true},
         {.name = "camera",
          .of = "speed crosscheck",

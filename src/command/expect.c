@@ -8,31 +8,19 @@
 #include "train/photos.h"
 #include "train/step_pixels.h"
 
-/* Core-seconds of a step, for the anchors in view and by its pixels, with AVX2. Chosen on runs of 42, 84 and
-   120 s of plush, fox, castle, aerial and the demo on two cores of a server CPU (bench/figures.py), which
-   they meet within a quarter. */
-static const double anchors_core_seconds = 0.028, core_seconds_per_megapixel = 0.76;
+/* Core-seconds of a step with AVX2, the mean over a run of 280 core-seconds: for the anchors in view, and by
+   its pixels. The longer a run the more anchors it has: its steps take (core-seconds / 280)^growth times as
+   long. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo, and of 4 minutes of
+   photos of megapixels, with AVX-512 on two cores of a server CPU, which they meet within 15 %. */
+static const double anchors_core_seconds = 0.053, core_seconds_per_megapixel = 0.2, growth = 0.15;
 static const double score_core_seconds_per_megapixel = 5.5;
 
-/* How many times as long the same takes. AVX-512 from runs of 42 s on another such machine; NEON and plain C
+/* How many times as long the same takes. AVX-512 from runs of 42 s on two such machines; NEON and plain C
    from instructions counted, and the tracer's time (docs/performance.md). */
 static const double slower_than_avx2[CPU_ISA_COUNT] = {
     [CPU_PLAIN] = 8, [CPU_NEON] = 1.7, [CPU_AVX2] = 1, [CPU_AVX512] = 0.6};
 
-/* The mean over a run with a budget, whose parts take equal times: photos of `camera`. */
-static double core_seconds_of_step(const gbt_camera *camera, const train_rules *rules)
-{
-    const double megapixels = step_pixel_count(camera, rules) / 1e6;
-    double steps_per_second = 0;
-    for (int part = 0; part < PACE_SEGMENTS; part++) {
-        const double hits = step_hits_per_pixel(rules, (part + 0.5) / PACE_SEGMENTS);
-        steps_per_second +=
-            1 / (anchors_core_seconds + core_seconds_per_megapixel * megapixels * hits) / PACE_SEGMENTS;
-    }
-    return 1 / steps_per_second;
-}
-
-expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa)
+expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa, double budget)
 {
     const gbt_train_def def = gbt_train_def_default();
     const train_rules rules = train_rules_of(&def);
@@ -43,12 +31,14 @@ expectation expect_training(const scene *s, double downscale, int threads, cpu_i
             test_pixels += (double)camera.width * camera.height;
             continue;
         }
-        seconds += core_seconds_of_step(&camera, &rules);
+        seconds +=
+            anchors_core_seconds + core_seconds_per_megapixel * step_pixel_count(&camera, &rules) / 1e6;
         train_count++;
     }
     const double speed = slower_than_avx2[isa] / threads;
-    return (expectation){.memory = memory_need_of(s, downscale),
-                         .step_seconds = speed * seconds / fmax(train_count, 1),
+    return (expectation){.memory = memory_need_of(s, downscale, rules.step_pixels),
+                         .step_seconds =
+                             speed * seconds / fmax(train_count, 1) * pow(budget / speed / 280, growth),
                          .score_seconds = speed * score_core_seconds_per_megapixel * test_pixels / 1e6,
                          .threads = threads};
 }

@@ -13,16 +13,16 @@
 
 typedef struct expectation {
     memory_need memory;
-    double step_seconds;  /* one iteration, the mean over a run with a budget */
+    double step_seconds;  /* one iteration, the mean over the run */
     double score_seconds; /* the held-out views: rendered, compared, written */
     int threads;          /* that the times are for */
 } expectation;
 
 /**
- * Of a run with the default settings and photos divided by `downscale`, above 0. Good
- * within a quarter on scenes and processors like those it was measured on.
+ * Of a run with the default settings, photos divided by `downscale`, above 0, and a budget of `budget`
+ * seconds, above 0. Good within a quarter on scenes and processors like those it was measured on.
  */
-expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa);
+expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa, double budget);
 
 json_t *expect_to_json(const expectation *e);
 

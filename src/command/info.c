@@ -20,6 +20,7 @@
 #include "data/photo_check.h"
 #include "data/scene.h"
 #include "io/model_file.h"
+#include "train/def.h"
 #include "train/photos.h"
 
 /* ---- data sets ---- */
@@ -155,7 +156,8 @@ static gbt_status info_of_dataset(const char *path, bool json, FILE *out, gbt_er
     double downscale;
     gbt_status status = photos_usual_downscale(&s, true, &downscale, err);
     if (status == GBT_OK)
-        facts.expect = expect_training(&s, downscale, parallel_threads(), cpu_best_isa());
+        facts.expect =
+            expect_training(&s, downscale, parallel_threads(), cpu_best_isa(), TRAIN_BUDGET_SECONDS);
     if (status == GBT_OK)
         status = find_box(s.points.position, s.points.count, s.origin, facts.low, facts.high, err);
     if (status == GBT_OK && json) {

@@ -9,27 +9,6 @@
 
 enum { PATH_POINTS = 400, STRIPS = 80 };
 
-static void draw_marks(text *out, const line_chart *c, const plot *p)
-{
-    double free_from = CHART_LEFT - 1; /* labels must not cover each other */
-    text_add(out, "<g class=\"marks\">");
-    for (size_t i = 0; i < c->mark_count; i++) {
-        if (!(c->marks[i].x >= p->x.low && c->marks[i].x <= p->x.high))
-            continue;
-        const double x = plot_x(p, c->marks[i].x), width = 6.0 * (double)strlen(c->marks[i].label);
-        if (x > CHART_LEFT + 1)
-            text_format(out, "<line x1=\"%.1f\" y1=\"%d\" x2=\"%.1f\" y2=\"%d\"/>", x, CHART_TOP, x,
-                        CHART_BOTTOM);
-        if (x < free_from || x + width > CHART_RIGHT)
-            continue;
-        text_format(out, "<text x=\"%.1f\" y=\"%d\">", x + 4, CHART_BOTTOM - 6);
-        text_escaped(out, c->marks[i].label);
-        text_add(out, "</text>");
-        free_from = x + width + 8;
-    }
-    text_add(out, "</g>");
-}
-
 static void draw_dot(text *out, const plot *p, int color, double x, double y)
 {
     text_format(out, "<circle class=\"dot c%d\" cx=\"%.1f\" cy=\"%.1f\" r=\"4\"", color & 3, plot_x(p, x),
@@ -191,7 +170,6 @@ void chart_lines(text *out, const line_chart *c)
     text_escaped(out, c->title);
     text_add(out, " over training time\">");
     plot_draw_axes(out, &p);
-    draw_marks(out, c, &p);
     for (int pass = 0; pass < 2; pass++) /* what is faint lies below */
         for (size_t s = 0; s < c->series_count; s++)
             if (c->series[s].count > 0 &&

@@ -34,12 +34,6 @@ typedef struct chart_series {
     chart_style style;
 } chart_series;
 
-/* A vertical line where something changed. */
-typedef struct chart_mark {
-    double x;
-    char label[32];
-} chart_mark;
-
 typedef struct line_chart {
     const char *title, *x_unit, *y_unit;
     const char *note; /* below the title; NULL: none */
@@ -47,8 +41,6 @@ typedef struct line_chart {
     int y_decimals; /* of the values read out; -1: counts with separators */
     const chart_series *series;
     size_t series_count;
-    const chart_mark *marks;
-    size_t mark_count;
 } line_chart;
 
 typedef struct chart_bar {

@@ -14,10 +14,27 @@
 enum { FIELD_LIMIT = 128 };
 
 static const char *const column_names[LOG_COLUMNS] = {
-    "step",       "seconds",           "width",           "height",          "loss",         "train_psnr",
-    "anchors",    "gaussians",         "rays_per_second", "blended_per_ray", "memory_bytes", "photo_ms",
-    "rays_ms",    "visible_ms",        "decode_ms",       "build_ms",        "trace_ms",     "loss_ms",
-    "adjoint_ms", "decode_adjoint_ms", "optimizer_ms",    "adjust_ms"};
+    "step",
+    "seconds",
+    "loss",
+    "train_psnr",
+    "anchors",
+    "gaussians",
+    "rays_per_second",
+    "blended_per_ray",
+    "memory_bytes",
+    "photo_ms",
+    "rays_ms",
+    "visible_ms",
+    "decode_ms",
+    "build_ms",
+    "trace_ms",
+    "loss_ms",
+    "adjoint_ms",
+    "decode_adjoint_ms",
+    "optimizer_ms",
+    "adjust_ms",
+};
 
 /** Cut a line at its commas, in place. More fields than FIELD_LIMIT are not looked at. */
 static size_t split_fields(char *line, char **fields)

@@ -10,8 +10,6 @@
 typedef enum log_column {
     LOG_STEP,
     LOG_SECONDS,
-    LOG_WIDTH,
-    LOG_HEIGHT,
     LOG_LOSS,
     LOG_TRAIN_PSNR,
     LOG_ANCHORS,

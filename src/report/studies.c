@@ -15,10 +15,9 @@ enum { CHART_BYTES_MAX = 1000000, CHARTS_MAX = 16, PATH_LIMIT = 4096 };
 /* The studies of this program, by the names of their files. */
 static const struct {
     const char *name, *title;
-} known[] = {{"speed", "Speed against accuracy"},   {"crosscheck", "Tracer against rasterizer"},
-             {"rate", "Bytes against quality"},     {"stability", "Where renderers fail"},
-             {"paper", "The paper's tables"},       {"time", "Quality against time"},
-             {"anchors", "Quality against anchors"}};
+} known[] = {{"speed", "Speed against accuracy"}, {"crosscheck", "Tracer against rasterizer"},
+             {"rate", "Bytes against quality"},   {"stability", "Where renderers fail"},
+             {"paper", "The paper's tables"},     {"time", "Quality against time"}};
 
 bool report_is_chart(const char *name)
 {

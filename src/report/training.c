@@ -27,7 +27,7 @@ static time_unit choose_time_unit(double longest)
                               : (time_unit){"s", 1};
 }
 
-enum { HELD_OUT_LIMIT = 256, MARK_LIMIT = 16 };
+enum { HELD_OUT_LIMIT = 256 };
 
 typedef struct curves {
     training_log log;
@@ -36,8 +36,6 @@ typedef struct curves {
         *megabytes; /* block owns the others, [log.count] each */
     double held_out_time[HELD_OUT_LIMIT], held_out_psnr[HELD_OUT_LIMIT];
     size_t held_out_count;
-    chart_mark marks[MARK_LIMIT];
-    size_t mark_count;
 } curves;
 
 static void add_held_out(curves *c, double seconds, double psnr)
@@ -45,29 +43,6 @@ static void add_held_out(curves *c, double seconds, double psnr)
     if (c->held_out_count < HELD_OUT_LIMIT && isfinite(seconds) && isfinite(psnr)) {
         c->held_out_time[c->held_out_count] = seconds / c->unit.seconds;
         c->held_out_psnr[c->held_out_count++] = psnr;
-    }
-}
-
-/** Where coarse to fine went on to the next resolution. */
-static void find_marks(curves *c)
-{
-    double width = 0, height = 0;
-    for (size_t i = 0; i < c->log.count && c->mark_count < MARK_LIMIT; i++) {
-        const double w = c->log.column[LOG_WIDTH][i], h = c->log.column[LOG_HEIGHT][i];
-        if (!(w >= 1 && h >= 1 && w < 1e6 && h < 1e6))
-            continue;
-        /* Photos of a set differ by a pixel or two, and a held-out score is at full size; only a step up to
-           stay is a step of the schedule. */
-        const bool stays =
-            i + 1 < c->log.count &&
-            c->log.column[LOG_WIDTH][i + 1] * c->log.column[LOG_HEIGHT][i + 1] > 1.5 * width * height;
-        if (w * h > 1.5 * width * height && stays) {
-            chart_mark *mark = &c->marks[c->mark_count++];
-            mark->x = c->mark_count == 1 ? 0 : c->time[i];
-            snprintf(mark->label, sizeof mark->label, "%.0f\xc3\x97%.0f px", w, h);
-            width = w;
-            height = h;
-        }
     }
 }
 
@@ -105,7 +80,6 @@ static gbt_status curves_make(curves *c, const char *run, const evaluation *e, c
         c->megabytes[j] = c->log.column[LOG_MEMORY][j] * 1e-6;
         c->time[j] = c->log.column[LOG_SECONDS][j] / c->unit.seconds;
     }
-    find_marks(c);
     return GBT_OK;
 }
 
@@ -145,8 +119,9 @@ static void add_curves(text *out, const curves *c)
          .y_decimals = 2,
          .series = psnr,
          .series_count = 3,
-         .note = "Training photos are scored at the resolution of the moment, from the middle of the run on "
-                 "half of them on a random background; held-out views at full size."},
+         .note =
+             "Training photos are scored on the pixels that a step looks at, from the middle of the run on "
+             "half of them on a random background; held-out views at full size."},
         {.title = "Anchors and Gaussians",
          .y_unit = "count",
          .from_zero = true,
@@ -173,14 +148,10 @@ static void add_curves(text *out, const curves *c)
          .series_count = 1},
     };
     text_add(out, "<section id=\"training\"><h2>Training</h2>\n");
-    if (c->mark_count > 1)
-        text_add(out, "<p class=\"lead\">Training goes from coarse to fine; dashed lines are where the "
-                      "pictures became larger.</p>\n");
     text_add(out, "<div class=\"grid2\">\n");
     for (size_t i = 0; i < sizeof charts / sizeof *charts; i++) {
         line_chart chart = charts[i];
-        chart.x_unit = c->unit.name, chart.marks = c->marks,
-        chart.mark_count = c->mark_count > 1 ? c->mark_count : 0;
+        chart.x_unit = c->unit.name;
         chart_lines(out, &chart);
     }
     text_add(out, "</div></section>\n");

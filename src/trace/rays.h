@@ -16,7 +16,7 @@
 /** Coordinates of a ray's origin are below it: squares of them have to stay finite in float. */
 #define RAY_ORIGIN_LIMIT 1e17
 
-enum { RAY_LENSES = 16 /* a photo trained on every fourth pixel of a row and a column is as many lenses */ };
+enum { RAY_LENSES = 64 /* a photo trained on every eighth pixel of a row and a column is as many lenses */ };
 
 /** What a lens makes of the pixel centres: directions in camera axes, [height * width][3]; owned. */
 typedef struct ray_lens {

@@ -6,42 +6,29 @@
 
 #include "train/step_pixels.h"
 
-/* What the time of pixels grows with: of a finer picture a pixel costs less, for those beside it see the same
-   Gaussians. Four times as many took 1.2 to 2.7 times as long, in the middle 2. */
-static double pixel_load(const train_rules *rules, double pixels, double progress)
-{
-    return step_hits_per_pixel(rules, progress) * sqrt(pixels);
-}
-
 void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_report *r)
 {
     const frame_times *f = &r->times;
     const double of_pixels = (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside;
     const double fixed = fmax(0, r->all.wall - of_pixels);
-    const double load =
-        pixel_load(&t->rules, (double)r->width * (double)r->height, pace_progress(&t->pace, step));
+    const double hits = step_hits_per_pixel(&t->rules, pace_progress(&t->pace, step));
     /* So long a mean that the few steps that take long have the share in it that they have in the part. */
     const double part = (double)t->pace.steps[pace_segment(&t->pace, step)];
     const double rate = fmax(1 / (double)++s->steps, 1 / fmax(20, part / 4));
     s->fixed_seconds += rate * (fixed - s->fixed_seconds);
-    s->load_seconds += rate * (of_pixels / load - s->load_seconds);
+    s->pixel_seconds += rate * (of_pixels / hits - s->pixel_seconds);
 }
 
-/* Seconds of a step in this part of the schedule: exact rays may begin inside it, and photos have different
-   sizes. */
+/* Seconds of a step in this part of the schedule: exact rays may begin inside it. */
 static double expected_step(const trainer *t, const step_speed *s, int part)
 {
     enum { PLACES = 8 };
     double sum = 0;
-    for (size_t v = 0; v < t->train_count; v++) {
-        const gbt_camera camera = photos_camera(&t->photos, t->train_views[v], 0);
-        const double pixels = step_pixel_count(&camera, &t->rules);
-        for (int i = 0; i < PLACES; i++) {
-            const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
-            sum += s->fixed_seconds + s->load_seconds * pixel_load(&t->rules, pixels, progress);
-        }
+    for (int i = 0; i < PLACES; i++) {
+        const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
+        sum += s->fixed_seconds + s->pixel_seconds * step_hits_per_pixel(&t->rules, progress);
     }
-    return sum / (double)(PLACES * t->train_count);
+    return sum / PLACES;
 }
 
 void budget_extend(trainer *t, const step_speed *s)

@@ -8,10 +8,10 @@
 
 #include "train/trainer.h"
 
-/** How long a step takes: so much by itself and so much times the root of the pixels of its first view, with
-    the hits of loose rays; means over about the last quarter of a part. {0} knows nothing. */
+/** How long a step takes: so much by itself, and so much for its pixels with the hits of loose rays; means
+   over about the last quarter of a part. {0} knows nothing. */
 typedef struct step_speed {
-    double fixed_seconds, load_seconds;
+    double fixed_seconds, pixel_seconds;
     uint64_t steps; /* measured */
 } step_speed;
 

@@ -54,6 +54,8 @@ void train_def_settle(gbt_train_def *d)
         d->footprint = 0;
     if (rules.near_depth > 0)
         d->near = 0;
+    if (isinf(rules.step_pixels))
+        d->step_pixels = 0;
     if (d->compat && d->alpha == GBT_ALPHA_AUTO)
         d->alpha = GBT_ALPHA_BLACK; /* Blender's scenes, too */
 }

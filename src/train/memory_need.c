@@ -16,10 +16,8 @@ static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes 
 static const double saved_point_bytes = 952; /* of the copy that a save beside the steps is written from */
 static const double found_points = 20000,    /* by photo consistency, where the data set has none */
     most_points = 131072; /* the tree of balls is 18 deep: more points make no more anchors */
-static const double most_step_pixels =
-    2.25 * 50000; /* of a photo with more every second one (step_pixels.h) */
 
-memory_need memory_need_of(const scene *s, double downscale)
+memory_need memory_need_of(const scene *s, double downscale, double step_pixels)
 {
     double train_bytes = 0, largest = 0, train_count = 0;
     const double decoded = photos_decoded_bytes(s);
@@ -44,7 +42,7 @@ memory_need memory_need_of(const scene *s, double downscale)
         .decoding = fmax(decoded * (double)photos_at_once(s, 0), decoded + seeding),
         .photos = fmin(train_bytes, (double)PHOTOS_KEPT_BYTES),
         .anchors = (learning_point_bytes + saved_point_bytes) * learning,
-        .view = fmax(score_pixel_bytes * largest, step_pixel_bytes * fmin(largest, most_step_pixels)),
+        .view = fmax(score_pixel_bytes * largest, step_pixel_bytes * fmin(largest, 2.25 * step_pixels)),
     };
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */
         starting = need.points + need.photos + fmax(need.decoding, need.trees),

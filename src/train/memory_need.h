@@ -18,8 +18,9 @@ typedef struct memory_need {
     double least;                 /* that a limit must leave: what can never be let go of */
 } memory_need;
 
-/** Of a run with the default settings and photos divided by `downscale` > 0. Within a factor of 1.5 on scenes
-    like those that it was measured on; a run that grows more anchors takes more. */
-memory_need memory_need_of(const scene *s, double downscale);
+/** Of a run with the default settings but for `step_pixels` (rules.h), and photos divided by `downscale` > 0.
+   Within a factor of 1.5 on scenes like those that it was measured on; a run that grows more anchors takes
+   more. */
+memory_need memory_need_of(const scene *s, double downscale, double step_pixels);
 
 #endif

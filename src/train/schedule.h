@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/schedule.h -- where a run stands (progress in [0, 1)) and what follows from it: resolution, learning
-   rates, growth.
+/* train/schedule.h -- where a run stands (progress in [0, 1)) and what follows from it: learning rates,
+   growth, anchors left out.
 
    Everything is a fraction of the run, so a short run is a whole run. A run is cut into PACE_SEGMENTS equal
    parts; the pace says how many iterations each part has. With a fixed number of iterations they are equal;

@@ -206,7 +206,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                               .views = t->def.views});
     t->left_out = leaves_out ? schedule_left_out(all_views / (double)t->train_count) : 0;
 
-    /* Views, and as many of their pixels as the model can already use: renders, losses, gradients. */
+    /* Views, some pixels of each: renders, losses, gradients. */
     GBT_TRY(run_views(t, out, err));
     report_views(t, out);
     for (int i = 0; i < t->def.views; i++)

@@ -56,6 +56,7 @@ static inline gbt_train_def run_def(void)
     def.iterations = STEPS;
     def.seed = 5;
     def.save_every_seconds = 0;
+    def.step_pixels = 24 * 18; /* every second one across and down */
     return def;
 }
 

@@ -214,7 +214,8 @@ static void the_other_rules_are_the_references(void **state)
     trainer t;
     open_ok(&t, tiny, &def);
     const train_rules *r = &t.rules;
-    assert_true(t.def.offsets == 10 && t.def.scale_factor == 1 && t.def.footprint == 0);
+    assert_true(t.def.offsets == 10 && t.def.scale_factor == 1 && t.def.footprint == 0 &&
+                t.def.step_pixels == 0);
     assert_true(!r->features_from_colors && r->raises_until == 0 && !r->limits_first_scale);
     for (size_t i = 0; i < t.anchors.count * ANCHOR_FEATURE_DIM; i++)
         assert_true(t.anchors.feature[i] == 0);

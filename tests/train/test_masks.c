@@ -554,6 +554,7 @@ static void steps_lay_photos_on_their_background(void **state)
     change_photos(folder, cut_out);
     for (int exposure = 0; exposure < 2; exposure++) {
         gbt_train_def def = run_def();
+        def.step_pixels = 0;
         def.exposure = exposure;
         def.find_exposure = false; /* it finds some in what the black behind them adds */
         trainer t;

@@ -42,7 +42,7 @@ static void a_step_has_the_near_distance_of_its_photo(void **state)
         float of_all;
         double nearest;
     } cases[] = {{0.25f, 0}, {100, 0.5}, {100, 0}};
-    static float drawn[3][3 * 48 * 36];
+    static float drawn[3][3 * 24 * 18];
     trainer t;
     const gbt_train_def def = run_def();
     open_ok(&t, tiny, &def);
@@ -56,7 +56,7 @@ static void a_step_has_the_near_distance_of_its_photo(void **state)
         step_view_run(&t, v);
         if (v->outcome.status != GBT_OK || v->outcome.bad)
             fail_msg("%s", v->outcome.text);
-        assert_true(v->frame.rgb.width == 48 && v->frame.rgb.height == 36);
+        assert_true(v->frame.rgb.width == 24 && v->frame.rgb.height == 18);
         memcpy(drawn[i], v->frame.rgb.pixels, sizeof drawn[i]);
     }
     assert_memory_equal(drawn[0], drawn[1], sizeof drawn[0]);

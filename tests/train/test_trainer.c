@@ -125,8 +125,7 @@ static void interrupted_and_resumed_is_straight(void **state)
     trainer_free(&t);
     model_free(&m);
     const char *run = in_folder("pieces");
-    static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, around resolutions, at the
-                                                                  ends */
+    static const uint64_t stops[] = {1, 2, 29, 30, STEPS - 1}; /* around growing, at the ends */
     for (size_t i = 0; i < sizeof stops / sizeof *stops; i++) {
         gbt_train_def def = run_def();
         def.resume = i > 0;
@@ -424,9 +423,8 @@ static void a_decimal_comma_changes_no_file(void **state)
     assert_same_file(in_folder("tiny/SCENE.md"), in_folder("comma_scene/SCENE.md"));
 }
 
-/* Steps take a time of their own, most of it in reading photos, and one per pixel, of a finer picture half of
-   that, twice that where rays are exact; one in fifty takes twenty times as long. The parts take equal times
-   all the same. */
+/* Steps take a time of their own, most of it in reading photos, and one for their pixels, twice that where
+   rays are exact; one in fifty takes twenty times as long. The parts take equal times all the same. */
 static void a_budget_gives_its_parts_equal_times(void **state)
 {
     (void)state;
@@ -436,21 +434,15 @@ static void a_budget_gives_its_parts_equal_times(void **state)
     def.grow = false;
     trainer t;
     open_ok(&t, tiny, &def);
-    for (size_t i = 0; i < t.scene.view_count; i++) /* steps look at some of their pixels */
-        t.scene.views[i].camera = gbt_camera_resized(&t.scene.views[i].camera, 480, 360);
-    const gbt_camera camera = photos_camera(&t.photos, t.train_views[0], 0);
     t.seconds = 0;
     step_speed speed = {0};
     for (int part = 0; part < PACE_SEGMENTS; part++) {
         const double before = t.seconds;
         budget_extend(&t, &speed);
         for (uint64_t i = 0; i < t.pace.steps[part]; i++, t.step++) {
-            const double progress = pace_progress(&t.pace, t.step);
-            const double pixels = step_pixel_count(&camera, &t.rules), times = t.step % 50 == 49 ? 20 : 1,
-                         of_pixels = times * 2e-6 * pixels * (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
-            const step_report report = {.width = (int)pixels,
-                                        .height = 1,
-                                        .beside = 1,
+            const double progress = pace_progress(&t.pace, t.step), times = t.step % 50 == 49 ? 20 : 1,
+                         of_pixels = times * 0.09 * (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
+            const step_report report = {.beside = 1,
                                         .times.trace.wall = of_pixels,
                                         .photo.wall = times * 0.008,
                                         .all.wall = times * 0.01 + of_pixels};
@@ -509,6 +501,7 @@ static void training_learns(void **state)
     (void)state;
     gbt_train_def def = run_def();
     def.iterations = 160;
+    def.step_pixels = 0;
     trainer t;
     open_ok(&t, tiny, &def);
     memset(t.settings.background, 0, sizeof t.settings.background); /* in front of black all that is right has
@@ -1071,7 +1064,8 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     def.overwrite = true;
     train_ok(tiny, in_folder("kept"), &def);
     assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
-    if (gbt_train_with(tiny, in_folder("kept"), "iterations = 3\nseed = 6\noverwrite = 1\n", &err) != GBT_OK)
+    if (gbt_train_with(tiny, in_folder("kept"),
+                       "iterations = 3\nseed = 6\nstep-pixels = 432\noverwrite = 1\n", &err) != GBT_OK)
         fail_msg("%s", err.text);
     assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
 }
@@ -1581,9 +1575,10 @@ static void config_comes_back(void **state)
     assert_ok(config_parse(text, "config", &back, &strings, &err));
     assert_null(back.pace);
 
-    /* Names of the command line. */
-    assert_ok(config_parse("threshold-factor = 2\nfinal-prune-factor = 3\nbudget = 7\ngrow = false\n",
-                           "config", &back, &strings, &err));
+    /* Names of the command line, and one that older files have. */
+    assert_ok(config_parse(
+        "threshold-factor = 2\nfinal-prune-factor = 3\nbudget = 7\ngrow = false\nstart-level = 2\n", "config",
+        &back, &strings, &err));
     assert_true(back.threshold_factor == 2 && back.final_prune_factor == 3 && back.budget_seconds == 7 &&
                 !back.grow);
 
@@ -1834,6 +1829,9 @@ static void steps_keep_to_their_pixels(void **state)
     const train_rules reference = train_rules_of(&compat);
     const gbt_camera large = {.width = 6000, .height = 4000};
     assert_int_equal(step_spacing(&large, &reference), 1);
+    const gbt_train_def all = {.step_pixels = 0};
+    const train_rules of_all = train_rules_of(&all);
+    assert_int_equal(step_spacing(&large, &of_all), 1);
 }
 
 static double downscale_to(const scene *s, double width)

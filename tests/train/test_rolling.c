@@ -25,6 +25,7 @@ static void make_rolling_scene(const char *folder)
 static gbt_train_def rolling_def(void)
 {
     gbt_train_def def = run_def();
+    def.step_pixels = 0;
     def.iterations = ROLLING_STEPS;
     return def;
 }

@@ -8,11 +8,12 @@
 #include "train/photos.h"
 #include "train/step_pixels.h"
 
-/* Core-seconds of a step with AVX2, the mean over a run of 280 core-seconds: for the anchors in view, and by
-   its pixels. The longer a run the more anchors it has: its steps take (core-seconds / 280)^growth times as
-   long. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo, and of 4 minutes of
+/* Core-seconds of a step with AVX2, the mean over a run of usual_core_seconds: for the anchors in view, and
+   by its pixels. The longer a run the more anchors it has: its steps take (core-seconds / usual)^growth times
+   as long. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo, and of 4 minutes of
    photos of megapixels, with AVX-512 on two cores of a server CPU, which they meet within 15 %. */
-static const double anchors_core_seconds = 0.053, core_seconds_per_megapixel = 0.2, growth = 0.15;
+static const double anchors_core_seconds = 0.053, core_seconds_per_megapixel = 0.2, growth = 0.15,
+                    usual_core_seconds = 280;
 static const double score_core_seconds_per_megapixel = 5.5;
 
 /* How many times as long the same takes. AVX-512 from runs of 42 s on two such machines; NEON and plain C
@@ -36,9 +37,9 @@ expectation expect_training(const scene *s, double downscale, int threads, cpu_i
         train_count++;
     }
     const double speed = slower_than_avx2[isa] / threads;
-    return (expectation){.memory = memory_need_of(s, downscale, rules.step_pixels),
-                         .step_seconds =
-                             speed * seconds / fmax(train_count, 1) * pow(budget / speed / 280, growth),
+    return (expectation){.memory = memory_need_of(s, downscale, &rules),
+                         .step_seconds = speed * seconds / fmax(train_count, 1) *
+                                         pow(budget / speed / usual_core_seconds, growth),
                          .score_seconds = speed * score_core_seconds_per_megapixel * test_pixels / 1e6,
                          .threads = threads};
 }

@@ -4,14 +4,19 @@
 
 #include <math.h>
 
-#include "train/step_pixels.h"
+/* What a pixel's ray costs, as a multiple of the loose rays' (rules.loose_rays): exact ones have twice the
+   hits. */
+static double hits_of_rays(const train_rules *rules, double progress)
+{
+    return train_rules_are_loose(rules, progress) ? 1 : 2;
+}
 
 void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_report *r)
 {
     const frame_times *f = &r->times;
     const double of_pixels = (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside;
     const double fixed = fmax(0, r->all.wall - of_pixels);
-    const double hits = step_hits_per_pixel(&t->rules, pace_progress(&t->pace, step));
+    const double hits = hits_of_rays(&t->rules, pace_progress(&t->pace, step));
     /* So long a mean that the few steps that take long have the share in it that they have in the part. */
     const double part = (double)t->pace.steps[pace_segment(&t->pace, step)];
     const double rate = fmax(1 / (double)++s->steps, 1 / fmax(20, part / 4));
@@ -26,7 +31,7 @@ static double expected_step(const trainer *t, const step_speed *s, int part)
     double sum = 0;
     for (int i = 0; i < PLACES; i++) {
         const double progress = (part + (i + 0.5) / PLACES) / PACE_SEGMENTS;
-        sum += s->fixed_seconds + s->pixel_seconds * step_hits_per_pixel(&t->rules, progress);
+        sum += s->fixed_seconds + s->pixel_seconds * hits_of_rays(&t->rules, progress);
     }
     return sum / PLACES;
 }

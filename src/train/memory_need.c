@@ -5,9 +5,9 @@
 #include <math.h>
 
 #include "train/photos.h"
-#include "train/rules.h"
 #include "train/seed_points.h"
 #include "train/seen_points.h"
+#include "train/step_pixels.h"
 
 /* Measured on fox, plush, castle and a district of 3 million points (docs/memory.md). */
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
@@ -17,14 +17,16 @@ static const double saved_point_bytes = 952; /* of the copy that a save beside t
 static const double found_points = 20000,    /* by photo consistency, where the data set has none */
     most_points = 131072; /* the tree of balls is 18 deep: more points make no more anchors */
 
-memory_need memory_need_of(const scene *s, double downscale, double step_pixels)
+memory_need memory_need_of(const scene *s, double downscale, const train_rules *rules)
 {
-    double train_bytes = 0, largest = 0, train_count = 0;
+    double train_bytes = 0, largest = 0, picked = 0, train_count = 0;
     const double decoded = photos_decoded_bytes(s);
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *v = &s->views[i];
         const double pixels = (double)v->camera.width * (double)v->camera.height / (downscale * downscale);
+        const gbt_camera camera = photo_camera_divided(&v->camera, downscale);
         largest = fmax(largest, pixels);
+        picked = fmax(picked, step_pixel_count(&camera, rules));
         train_count += !v->is_test;
         train_bytes += v->is_test ? 0 : (3 + (v->mask_path != NULL) + v->has_alpha) * pixels;
     }
@@ -42,7 +44,7 @@ memory_need memory_need_of(const scene *s, double downscale, double step_pixels)
         .decoding = fmax(decoded * (double)photos_at_once(s, 0), decoded + seeding),
         .photos = fmin(train_bytes, (double)PHOTOS_KEPT_BYTES),
         .anchors = (learning_point_bytes + saved_point_bytes) * learning,
-        .view = fmax(score_pixel_bytes * largest, step_pixel_bytes * fmin(largest, 2.25 * step_pixels)),
+        .view = fmax(score_pixel_bytes * largest, step_pixel_bytes * picked),
     };
     const double scoring = need.reading + model_point_bytes * learning, /* the data is read again */
         starting = need.points + need.photos + fmax(need.decoding, need.trees),

@@ -4,6 +4,7 @@
 #define GBT_TRAIN_MEMORY_NEED_H
 
 #include "data/scene.h"
+#include "train/rules.h"
 
 /** Bytes. Reading, trees and steps follow each other. */
 typedef struct memory_need {
@@ -18,9 +19,9 @@ typedef struct memory_need {
     double least;                 /* that a limit must leave: what can never be let go of */
 } memory_need;
 
-/** Of a run with the default settings but for `step_pixels` (rules.h), and photos divided by `downscale` > 0.
-   Within a factor of 1.5 on scenes like those that it was measured on; a run that grows more anchors takes
+/** Of a run with the default settings, the pixels of a step by `rules`, and photos divided by `downscale` >
+   0. Within a factor of 1.5 on scenes like those that it was measured on; a run that grows more anchors takes
    more. */
-memory_need memory_need_of(const scene *s, double downscale, double step_pixels);
+memory_need memory_need_of(const scene *s, double downscale, const train_rules *rules);
 
 #endif

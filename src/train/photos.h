@@ -87,8 +87,7 @@ gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsig
  * photo at full size through the middle of these pixels.
  *
  * @param sample [in]  of a photo that has pick.step pixels each way, or more
- * @param camera [out] may be smaller than the photo / pick.step by a pixel: the same size for every
- * pick.first
+ * @param camera [out] its size is the photo's / pick.step, rounded down, wherever the first pixel is
  * @param valid  [out] as photos_get() has them; borrowed until the next call
  */
 gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample, image *out,

@@ -130,7 +130,7 @@ static gbt_status choose_downscale(trainer *t, gbt_error *err)
 /* Before any work: a limit that cannot be kept. */
 static gbt_status check_memory(const trainer *t, gbt_error *err)
 {
-    const memory_need need = memory_need_of(&t->scene, t->def.downscale, t->rules.step_pixels);
+    const memory_need need = memory_need_of(&t->scene, t->def.downscale, &t->rules);
     if (t->def.memory == 0 || (double)t->def.memory >= need.least)
         return GBT_OK;
     return base_fail(

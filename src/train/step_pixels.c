@@ -16,8 +16,3 @@ double step_pixel_count(const gbt_camera *camera, const train_rules *rules)
     const double spacing = step_spacing(camera, rules);
     return (double)camera->width * camera->height / (spacing * spacing);
 }
-
-double step_hits_per_pixel(const train_rules *rules, double progress)
-{
-    return train_rules_are_loose(rules, progress) ? 1 : 2;
-}

@@ -16,8 +16,4 @@ int step_spacing(const gbt_camera *camera, const train_rules *rules);
 /** How many pixels that is, about. */
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules);
 
-/** What a pixel's ray costs at `progress`, as a multiple of the loose rays' (rules.loose_rays): exact ones
-   have twice the hits. */
-double step_hits_per_pixel(const train_rules *rules, double progress);
-
 #endif

@@ -483,8 +483,8 @@ static void memory_runs_out(void **state)
     gaussians_free(&g);
 }
 
-/* A corner as a camera of its own (gbt_camera_cropped()) shows what the whole picture has
-   there, of Gaussians long enough in depth for the limits of J to matter. */
+/* A corner as a camera of its own (gbt_camera_cropped()) shows what the whole picture has there,
+   of Gaussians long enough in depth for the limits of J to matter. */
 static void a_part_is_the_part_of_the_picture(void **state)
 {
     (void)state;

@@ -173,9 +173,9 @@ static void write_log(int rows, const char *tail)
     for (int i = 0; i < rows; i++)
         used +=
             sprintf(csv + used,
-                    "%d,%.3f,0.1,%d,%d,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n",
-                    10 * (i + 1), 1.01 * (i + 1), 240, 180, 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i,
-                    5000 + 7 * i, 400000 + 100 * i);
+                    "%d,%.3f,0.1,240,180,%.6f,0.1,0.5,%.4f,,%d,%d,300,20.5,%d,1000,1,2,3,4,5,6,7,8,9,10,11\n",
+                    10 * (i + 1), 1.01 * (i + 1), 0.4 / (1 + i), 10 + 15.0 * i / rows, 1000 + i, 5000 + 7 * i,
+                    400000 + 100 * i);
     strcpy(csv + used, tail);
     write_text(in_folder("log.csv"), csv);
     free(csv);

@@ -109,23 +109,30 @@ static void what_it_takes(void **state)
 {
     (void)state;
     scene s;
+    gbt_train_def def = gbt_train_def_default();
+    const train_rules usual = train_rules_of(&def);
+    def.step_pixels = 0;
+    const train_rules rules_of_all = train_rules_of(&def);
+    def.step_pixels = 5000;
+    const train_rules rules_of_some = train_rules_of(&def);
     assert_ok(scene_load(tiny, NULL, &s, NULL));
-    const memory_need small = memory_need_of(&s, 1, 50000);
+    const memory_need small = memory_need_of(&s, 1, &usual);
     s.points.count = 1000000;
-    const memory_need large = memory_need_of(&s, 1, 50000), fine = memory_need_of(&s, 2, 50000);
+    const memory_need large = memory_need_of(&s, 1, &usual), fine = memory_need_of(&s, 2, &usual);
     s.points.count = 0;
     assert_true(s.file_bytes > 0 && small.reading > (double)s.file_bytes);
     assert_true(small.least > small.program && small.whole >= small.least);
     assert_true(large.whole > small.whole && large.least > small.least && large.whole > large.least &&
                 fine.photos < large.photos);
-    const memory_need all = memory_need_of(&s, 0.1, HUGE_VAL), some = memory_need_of(&s, 0.1, 5000);
+    const memory_need all = memory_need_of(&s, 0.1, &rules_of_all),
+                      some = memory_need_of(&s, 0.1, &rules_of_some);
     assert_true(all.view > 2 * some.view);
     const memory_need found =
-        memory_need_of(&s, 1, 50000); /* points are, in smaller photos that are all held */
+        memory_need_of(&s, 1, &usual); /* points are, in smaller photos that are all held */
     assert_true(found.decoding >= (VIEWS - 2) * 16.0 * 48 * 36);
     for (size_t i = 0; i < s.view_count; i++)
         s.views[i].photo_width = 100 * s.views[i].camera.width; /* as stored: 17 megapixels */
-    const memory_need stored = memory_need_of(&s, 1, 50000);
+    const memory_need stored = memory_need_of(&s, 1, &usual);
     assert_true(stored.decoding >= 24.0 * 4800 * 3600 && stored.least > 24.0 * 4800 * 3600);
     assert_true(stored.photos == small.photos && stored.whole > stored.decoding + stored.program);
     assert_int_equal(photos_at_once(&s, 1), 1);
@@ -140,7 +147,7 @@ static void what_it_takes(void **state)
         s.views[i].is_exr = false;
         s.views[i].has_alpha = true;
     }
-    const memory_need clear = memory_need_of(&s, 1, 50000);
+    const memory_need clear = memory_need_of(&s, 1, &usual);
     assert_true(fabs(clear.photos - 4.0 / 3 * stored.photos) < 1);
     assert_int_equal(photos_at_once(&s, (size_t)(24.0 * 4800 * 3600 * 2)), 1);
     scene_free(&s);

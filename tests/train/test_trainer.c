@@ -1734,7 +1734,6 @@ static void picked_pixels_begin_anywhere(void **state)
     int seen[4] = {0};
     gbt_train_def def = run_def();
     def.iterations = 1000;
-    def.step_pixels = 24 * 18;
     open_ok(&t, tiny, &def);
     for (; t.step < 10 * t.train_count; t.step++) {
         const step_view *v = pick_ok(&t);

@@ -36,22 +36,8 @@ bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], dou
 
 bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2])
 {
-    enum { STEPS_MAX = 50 }; /* each leaves the share of the image's height that the motion moves a point */
     camera_lens lens;
-    camera_pose pose = camera_pose_during(camera, 0.5);
-    if (!camera_lens_prepare(camera, &lens) || !camera_pose_pixel(&pose, &lens, point, pixel))
-        return false;
-    if (camera_is_still(camera))
-        return true;
-    for (int i = 0; i < STEPS_MAX; i++) {
-        const double before[2] = {pixel[0], pixel[1]};
-        pose = camera_pose_at(camera, pixel[0], pixel[1]);
-        if (!camera_pose_pixel(&pose, &lens, point, pixel))
-            return false;
-        if (fabs(pixel[0] - before[0]) + fabs(pixel[1] - before[1]) < 1e-9)
-            return true;
-    }
-    return false;
+    return camera_lens_prepare(camera, &lens) && camera_pixel(camera, &lens, point, pixel);
 }
 
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height)

@@ -74,7 +74,8 @@ static bool take_params(const gbt_camera *camera, const camera_model *model, cam
                               [LENS_S3] = &lens->prism[3],
                               [LENS_SHAPE0] = &lens->shape[0],
                               [LENS_SHAPE1] = &lens->shape[1]};
-    for (int i = 0; i < gbt_camera_param_count(camera->model); i++) {
+    const int count = gbt_camera_param_count(camera->model);
+    for (int i = 0; i < count; i++) {
         const double value = camera->params[i];
         if (!isfinite(value))
             return false;

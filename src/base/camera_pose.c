@@ -178,6 +178,25 @@ bool camera_pose_pixel(const camera_pose *pose, const camera_lens *lens, const d
     return camera_lens_project(lens, cam, pixel);
 }
 
+bool camera_pixel(const gbt_camera *camera, const camera_lens *lens, const double point[3], double pixel[2])
+{
+    enum { STEPS_MAX = 50 }; /* each leaves the share of the image's height that the motion moves a point */
+    camera_pose pose = camera_pose_during(camera, 0.5);
+    if (!camera_pose_pixel(&pose, lens, point, pixel))
+        return false;
+    if (camera_is_still(camera))
+        return true;
+    for (int i = 0; i < STEPS_MAX; i++) {
+        const double before[2] = {pixel[0], pixel[1]};
+        pose = camera_pose_at(camera, pixel[0], pixel[1]);
+        if (!camera_pose_pixel(&pose, lens, point, pixel))
+            return false;
+        if (fabs(pixel[0] - before[0]) + fabs(pixel[1] - before[1]) < 1e-9)
+            return true;
+    }
+    return false;
+}
+
 static void stand_at(const camera_pose *pose, gbt_camera *camera)
 {
     memcpy(camera->rotation, pose->rotation, sizeof pose->rotation);

@@ -47,6 +47,9 @@ camera_pose *camera_line_poses(const gbt_camera *camera, int *count, gbt_error *
 bool camera_pose_pixel(const camera_pose *pose, const camera_lens *lens, const double point[3],
                        double pixel[2]);
 
+/** gbt_camera_pixel() with the camera's lens prepared, same bits. */
+bool camera_pixel(const gbt_camera *camera, const camera_lens *lens, const double point[3], double pixel[2]);
+
 /** The same camera with the pose and motion that it has while a part of its image is read out: `width` by
     `height` pixels from (x, y) on, which may lie beyond the edges. */
 gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height);

@@ -8,8 +8,9 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "base/stop_signal.h"
+#include "train/step_pixels.h"
 
-enum { VIEWS_MAX = 64, SEED = 11 };
+enum { VIEWS_MAX = 64, PROBE_PIXELS = 50000, SEED = 11 };
 
 typedef struct probe {
     image signs;
@@ -17,17 +18,22 @@ typedef struct probe {
     float *d_params;
 } probe;
 
-/* Half the run's resolution says the same at a quarter of the cost. */
-static gbt_camera probe_camera(const loaded_run *r, size_t view)
+/* Half the run's resolution, and of that at most about PROBE_PIXELS, say the same as all. */
+static gbt_camera probe_camera(const loaded_run *r, size_t view, int *spacing)
 {
-    gbt_camera camera = photos_camera(&r->photos, view, 0);
-    return camera.width < 16 || camera.height < 16 ? camera : photos_camera(&r->photos, view, 1);
+    const gbt_camera full = photos_camera(&r->photos, view, 0);
+    const gbt_camera all = full.width < 16 || full.height < 16 ? full : photos_camera(&r->photos, view, 1);
+    gbt_camera some = all;
+    *spacing = step_spacing(&all, PROBE_PIXELS);
+    if (!gbt_camera_every(&all, *spacing, *spacing / 2, *spacing / 2, &some))
+        *spacing = 1;
+    return some;
 }
 
 static gbt_status add_view(loaded_run *r, size_t view, probe *p, model_sensitivity *out, gbt_error *err)
 {
     const anchors *a = &r->model.anchors;
-    const gbt_camera camera = probe_camera(r, view);
+    const gbt_camera camera = probe_camera(r, view, &r->frame.draw.pixel_step);
     const trace_settings settings = loaded_run_settings(r, view);
     GBT_TRY(frame_render(&r->frame, frame_neural(a, &r->model.decoder), &camera, &settings, true, err));
     GBT_TRY(image_fit(&p->signs, camera.width, camera.height, 3, err));

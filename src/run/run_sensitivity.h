@@ -12,7 +12,8 @@
 /**
  * Sensitivities of the run's model (io/model_steps.h), from its training cameras alone: photos are not read.
  *
- * Renders at most 64 of the views, spread over all, at half the run's resolution, with one adjoint pass each.
+ * Renders at most 64 of the views, spread over all, at half the run's resolution, of large photos every n-th
+ * pixel of that, with one adjoint pass each.
  * Without training views: the guess. Between stop_signal_catch() and stop_signal_release() a signal ends it
  * with GBT_ERR_INTERRUPTED.
  *

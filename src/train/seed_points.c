@@ -8,6 +8,8 @@
 #include <string.h>
 
 #include "base/camera_axes.h"
+#include "base/camera_lens.h"
+#include "base/camera_pose.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/log.h"
@@ -42,6 +44,7 @@ typedef struct candidate {
 
 typedef struct seed_view {
     gbt_camera camera;
+    camera_lens lens;
     image photo;
     float *gray; /* [height * width]; NaN where a pixel does not count */
     size_t neighbor[NEIGHBORS];
@@ -111,12 +114,12 @@ static void find_neighbors(seeding *s, double distance)
     }
 }
 
-static bool project(const gbt_camera *camera, const double world[3], double pixel[2])
+static bool project(const seed_view *v, const double world[3], double pixel[2])
 {
     double ahead = 0;
     for (int k = 0; k < 3; k++)
-        ahead += camera->rotation[6 + k] * (world[k] - camera->center[k]);
-    return ahead > 0 && gbt_camera_pixel(camera, world, pixel);
+        ahead += v->camera.rotation[6 + k] * (world[k] - v->camera.center[k]);
+    return ahead > 0 && camera_pixel(&v->camera, &v->lens, world, pixel);
 }
 
 /* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a
@@ -186,8 +189,8 @@ static float agreement_at(const sweep *w, double depth)
         const seed_view *other = &w->s->views[w->view->neighbor[n]];
         double pixel[3][2], step[2][2];
         float patch[PATCH_AREA], sum = 0;
-        if (!project(&other->camera, world[0], pixel[0]) || !project(&other->camera, world[1], pixel[1]) ||
-            !project(&other->camera, world[2], pixel[2]))
+        if (!project(other, world[0], pixel[0]) || !project(other, world[1], pixel[1]) ||
+            !project(other, world[2], pixel[2]))
             continue;
         for (int k = 0; k < 2; k++) {
             step[0][k] = pixel[1][k] - pixel[0][k];
@@ -221,7 +224,7 @@ static bool start_sweep(const seeding *s, const seed_view *v, double px, double 
     memcpy(w->start, at.center, sizeof w->start);
     for (int p = 0; p < 3; p++) {
         double dir[3];
-        if (!gbt_camera_unproject(&v->camera, px + step[p][0], py + step[p][1], dir) || dir[2] < 0.1)
+        if (!camera_lens_unproject(&v->lens, px + step[p][0], py + step[p][1], dir) || dir[2] < 0.1)
             return false;
         const double plane[3] = {dir[0] / dir[2], dir[1] / dir[2], 1};
         dmat_apply_transposed(at.rotation, plane, w->ray[p]);
@@ -340,6 +343,8 @@ static gbt_status read_views(seeding *s, photos *source, const size_t *views, si
         v->camera = photos_camera(source, view, 0);
         while (v->camera.width > SEED_LONG_SIDE || v->camera.height > SEED_LONG_SIDE)
             v->camera = photos_camera(source, view, ++level);
+        if (!camera_lens_prepare(&v->camera, &v->lens))
+            return base_fail(err, GBT_ERR_ARGUMENT, "photo %zu: unusable camera parameters", view);
         const unsigned char *valid;
         GBT_TRY(photos_get(source, view, level, &v->photo, &valid, err));
         const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;

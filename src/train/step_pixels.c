@@ -4,15 +4,15 @@
 
 #include <math.h>
 
-int step_spacing(const gbt_camera *camera, const train_rules *rules)
+int step_spacing(const gbt_camera *camera, double pixels)
 {
-    const double times = (double)camera->width * camera->height / rules->step_pixels;
+    const double times = (double)camera->width * camera->height / pixels;
     const int smaller = camera->width < camera->height ? camera->width : camera->height;
     return (int)fmin(fmax(floor(sqrt(times) + 0.5), 1), smaller);
 }
 
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules)
 {
-    const double spacing = step_spacing(camera, rules);
+    const double spacing = step_spacing(camera, rules->step_pixels);
     return (double)camera->width * camera->height / (spacing * spacing);
 }

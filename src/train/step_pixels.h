@@ -11,7 +11,7 @@
  *
  * @param camera [in] of the photo, of the size that it is trained at
  */
-int step_spacing(const gbt_camera *camera, const train_rules *rules);
+int step_spacing(const gbt_camera *camera, double pixels);
 
 /** How many pixels that is, about. */
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules);

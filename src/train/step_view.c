@@ -54,7 +54,7 @@ static photo_pick pick_pixels(const trainer *t, size_t view, uint64_t before)
 {
     uint32_t words[4];
     const gbt_camera camera = photos_camera(&t->photos, view, 0);
-    const int step = step_spacing(&camera, &t->rules);
+    const int step = step_spacing(&camera, t->rules.step_pixels);
     rng_philox(t->def.seed, RNG_STREAM_PIXELS, before, words);
     return (photo_pick){.first = {(int)(words[0] % (unsigned)step), (int)(words[1] % (unsigned)step)},
                         .step = step};

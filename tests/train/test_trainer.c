@@ -1812,7 +1812,7 @@ static void steps_keep_to_their_pixels(void **state)
     for (int width = 3; width < 12000; width += width / 10 + 1) {
         const gbt_camera camera = {.width = width, .height = width * 2 / 3};
         const double all = (double)width * camera.height, pixels = step_pixel_count(&camera, &rules);
-        const int spacing = step_spacing(&camera, &rules);
+        const int spacing = step_spacing(&camera, rules.step_pixels);
         assert_in_range(spacing, last, width / 2);
         last = spacing;
         assert_true(fabs(pixels * spacing * spacing - all) < 1e-9 * all);
@@ -1822,15 +1822,15 @@ static void steps_keep_to_their_pixels(void **state)
             assert_true(pixels > 0.56 * rules.step_pixels && pixels < 1.57 * rules.step_pixels);
     }
     const gbt_camera narrow = {.width = 3, .height = 1000000};
-    assert_int_equal(step_spacing(&narrow, &rules), 3);
+    assert_int_equal(step_spacing(&narrow, rules.step_pixels), 3);
     gbt_train_def compat = def;
     compat.compat = true;
     const train_rules reference = train_rules_of(&compat);
     const gbt_camera large = {.width = 6000, .height = 4000};
-    assert_int_equal(step_spacing(&large, &reference), 1);
+    assert_int_equal(step_spacing(&large, reference.step_pixels), 1);
     const gbt_train_def all = {.step_pixels = 0};
     const train_rules of_all = train_rules_of(&all);
-    assert_int_equal(step_spacing(&large, &of_all), 1);
+    assert_int_equal(step_spacing(&large, of_all.step_pixels), 1);
 }
 
 static double downscale_to(const scene *s, double width)

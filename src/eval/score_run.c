@@ -11,8 +11,37 @@
 #include "base/file.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
+
+/* The pictures of a view, each with what became of its file. */
+typedef struct view_pictures {
+    const image *picture[3];
+    const char *path[3];
+    gbt_status status[3];
+    gbt_error error[3];
+} view_pictures;
+
+static void write_pictures(size_t block, size_t begin, size_t end, void *context)
+{
+    (void)block;
+    view_pictures *p = context;
+    for (size_t i = begin; i < end; i++)
+        p->status[i] = image_write(p->path[i], p->picture[i], &p->error[i]);
+}
+
+static gbt_status write_view(view_pictures *p, gbt_error *err)
+{
+    parallel_blocks(3, 1, write_pictures, p);
+    for (int i = 0; i < 3; i++)
+        if (p->status[i] != GBT_OK) {
+            if (err != NULL)
+                *err = p->error[i];
+            return p->status[i];
+        }
+    return GBT_OK;
+}
 
 /* Pictures go into `folder`; NULL: none. */
 static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder,
@@ -47,10 +76,11 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
         score->lpips = (lpips_scores){(double)NAN, (double)NAN};
     if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
-    const image *const pictures[] = {render, &photo, &error_map};
-    const char *const paths[] = {score->render_path, score->photo_path, score->error_path};
-    for (int i = 0; i < 3 && status == GBT_OK && folder != NULL; i++)
-        status = image_write(paths[i], pictures[i], err);
+    if (status == GBT_OK && folder != NULL)
+        status =
+            write_view(&(view_pictures){.picture = {render, &photo, &error_map},
+                                        .path = {score->render_path, score->photo_path, score->error_path}},
+                       err);
     image_free(&photo);
     image_free(&error_map);
     return status;

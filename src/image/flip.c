@@ -13,6 +13,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/clones.h"
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -23,8 +24,9 @@ enum {
     RADIUS_MAX = 16,
     TAPS_MAX = 2 * RADIUS_MAX + 1,
     PLANES = 3,
-    COLUMN_FILTERS = 7, /* Y, Cx, Cz twice; then Y by Gauss, its first and its second derivative */
-    BLOCK_ROWS = COLUMN_FILTERS + 2 * 5
+    FILTERED = 8, /* Y, Cx, Cz twice; Y by the edge and the point detector, each across and down */
+    SEEN = 5,     /* L, a, b, edge and point strength */
+    BLOCK_ROWS = 1 + FILTERED + 2 * SEEN
 };
 
 /* Section 5 of the paper: 0.7 m from a monitor 0.7 m wide with 3840 pixels. */
@@ -204,8 +206,8 @@ static void opponent_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Column pass into a row that has RADIUS_MAX values of margin on both sides, filled by repeating its ends. */
-static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f,
-                           double *restrict out)
+FASTEST_CLONE static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f,
+                                         double *restrict out)
 {
     memset(out, 0, job->width * sizeof *out);
     for (int k = -f->radius; k <= f->radius; k++) {
@@ -221,35 +223,46 @@ static void filter_columns(const flip_job *job, const float *plane, size_t row, 
     }
 }
 
-static double filter_row(const double *in, const filter *f)
+/* Row pass over what filter_columns() left. */
+FASTEST_CLONE static void filter_row(const double *restrict in, const filter *f, size_t width,
+                                     double *restrict out)
 {
-    double sum = 0;
-    for (int k = -f->radius; k <= f->radius; k++)
-        sum += f->taps[k + f->radius] * in[k];
-    return sum;
+    memset(out, 0, width * sizeof *out);
+    for (int k = -f->radius; k <= f->radius; k++) {
+        const double tap = f->taps[k + f->radius];
+        for (size_t i = 0; i < width; i++)
+            out[i] += tap * in[(ptrdiff_t)i + k];
+    }
 }
 
-/* L, a, b, edge and point strength of one row of one image. */
-static void appearance(const flip_job *job, int source, size_t row, double *const columns[COLUMN_FILTERS],
-                       double *const out[5])
+/* One row of a plane by the product of two 1-D filters. `column` is for its column pass. */
+static void filter_plane(const flip_job *job, const float *plane, size_t row, const filter *down,
+                         const filter *across, double *column, double *out)
+{
+    filter_columns(job, plane, row, down, column);
+    filter_row(column, across, job->width, out);
+}
+
+/* What is seen of one row of one image. */
+static void appearance(const flip_job *job, int source, size_t row, double *column,
+                       double *const filtered[FILTERED], double *const out[SEEN])
 {
     const flip_filters *f = job->filters;
     const size_t plane = job->width * job->height;
     const float *y = job->planes[source], *cx = y + plane, *cz = cx + plane;
-    filter_columns(job, y, row, &f->luminance, columns[0]);
-    filter_columns(job, cx, row, &f->red_green, columns[1]);
-    filter_columns(job, cz, row, &f->blue_yellow[0], columns[2]);
-    filter_columns(job, cz, row, &f->blue_yellow[1], columns[3]);
-    filter_columns(job, y, row, &f->gauss, columns[4]);
-    filter_columns(job, y, row, &f->edge, columns[5]);
-    filter_columns(job, y, row, &f->point, columns[6]);
+    filter_plane(job, y, row, &f->luminance, &f->luminance, column, filtered[0]);
+    filter_plane(job, cx, row, &f->red_green, &f->red_green, column, filtered[1]);
+    filter_plane(job, cz, row, &f->blue_yellow[0], &f->blue_yellow[0], column, filtered[2]);
+    filter_plane(job, cz, row, &f->blue_yellow[1], &f->blue_yellow[1], column, filtered[3]);
+    filter_plane(job, y, row, &f->gauss, &f->edge, column, filtered[4]);
+    filter_plane(job, y, row, &f->edge, &f->gauss, column, filtered[5]);
+    filter_plane(job, y, row, &f->gauss, &f->point, column, filtered[6]);
+    filter_plane(job, y, row, &f->point, &f->gauss, column, filtered[7]);
     for (size_t i = 0; i < job->width; i++) {
-        const double luminance = (filter_row(columns[0] + i, &f->luminance) + 16) / 116;
-        const double red_green = filter_row(columns[1] + i, &f->red_green) / 500;
+        const double luminance = (filtered[0][i] + 16) / 116;
+        const double red_green = filtered[1][i] / 500;
         const double blue_yellow =
-            (f->blue_yellow_weight[0] * filter_row(columns[2] + i, &f->blue_yellow[0]) +
-             f->blue_yellow_weight[1] * filter_row(columns[3] + i, &f->blue_yellow[1])) /
-            200;
+            (f->blue_yellow_weight[0] * filtered[2][i] + f->blue_yellow_weight[1] * filtered[3][i]) / 200;
         const double xyz[3] = {(luminance + red_green) * f->white[0], luminance * f->white[1],
                                (luminance - blue_yellow) * f->white[2]};
         double rgb[3], lab[3];
@@ -261,27 +274,25 @@ static void appearance(const flip_job *job, int source, size_t row, double *cons
         out[1][i] = lab[1];
         out[2][i] = lab[2];
         /* The detectors work on Y scaled to [0, 1]; their taps sum to 0, so only the factor matters. */
-        out[3][i] =
-            dvec_length2(filter_row(columns[4] + i, &f->edge), filter_row(columns[5] + i, &f->gauss)) / 116;
-        out[4][i] =
-            dvec_length2(filter_row(columns[4] + i, &f->point), filter_row(columns[6] + i, &f->gauss)) / 116;
+        out[3][i] = dvec_length2(filtered[4][i], filtered[5][i]) / 116;
+        out[4][i] = dvec_length2(filtered[6][i], filtered[7][i]) / 116;
     }
 }
 
 static void error_rows(size_t block, size_t begin, size_t end, void *context)
 {
     const flip_job *job = context;
-    double *const rows = job->rows + block * BLOCK_ROWS * job->padded + RADIUS_MAX;
-    double *columns[COLUMN_FILTERS], *seen[2][5];
-    for (size_t r = 0; r < COLUMN_FILTERS; r++)
-        columns[r] = rows + r * job->padded;
-    for (size_t r = 0; r < 5; r++) {
-        seen[0][r] = rows + (COLUMN_FILTERS + r) * job->padded;
-        seen[1][r] = rows + (COLUMN_FILTERS + 5 + r) * job->padded;
+    double *const column = job->rows + block * BLOCK_ROWS * job->padded + RADIUS_MAX;
+    double *filtered[FILTERED], *seen[2][SEEN];
+    for (size_t r = 0; r < FILTERED; r++)
+        filtered[r] = column + (1 + r) * job->padded;
+    for (size_t r = 0; r < SEEN; r++) {
+        seen[0][r] = column + (1 + FILTERED + r) * job->padded;
+        seen[1][r] = column + (1 + FILTERED + SEEN + r) * job->padded;
     }
     for (size_t row = begin; row < end; row++) {
-        appearance(job, 0, row, columns, seen[0]);
-        appearance(job, 1, row, columns, seen[1]);
+        appearance(job, 0, row, column, filtered, seen[0]);
+        appearance(job, 1, row, column, filtered, seen[1]);
         double sum = 0;
         for (size_t i = 0; i < job->width; i++) {
             const double a[3] = {seen[0][0][i], seen[0][1][i], seen[0][2][i]},

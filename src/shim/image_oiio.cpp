@@ -386,6 +386,8 @@ gbt_status encode_png(const image *im, std::vector<unsigned char> *bytes, gbt_er
     OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeUInt8);
     spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("png:compressionLevel", 4); /* a third of the time of the usual 6, files up to 8 % larger
+                                                */
     return encode("png", "image.png", spec, samples.data(), bytes, err);
 }
 

@@ -81,6 +81,7 @@ gbt_status run_sensitivity(loaded_run *r, model_sensitivity *out, gbt_error *err
         return model_sensitivity_guess(&r->model, out, err);
     GBT_TRY(model_sensitivity_start(out, r->model.anchors.count, err));
     const gbt_status status = add_views(r, count, out, err);
+    r->frame.draw.pixel_step = 1;
     model_sensitivity_end(out);
     return status;
 }

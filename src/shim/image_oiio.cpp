@@ -386,8 +386,7 @@ gbt_status encode_png(const image *im, std::vector<unsigned char> *bytes, gbt_er
     OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeUInt8);
     spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("png:compressionLevel", 4); /* a third of the time of the usual 6, files up to 8 % larger
-                                                */
+    spec.attribute("png:compressionLevel", 4); /* the usual 6 takes three times as long for 8 % less */
     return encode("png", "image.png", spec, samples.data(), bytes, err);
 }
 

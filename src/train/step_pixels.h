@@ -10,6 +10,7 @@
  * not much larger. Returned is n, at least 1.
  *
  * @param camera [in] of the photo, of the size that it is trained at
+ * @param pixels [in] how many, about; infinite: all
  */
 int step_spacing(const gbt_camera *camera, double pixels);
 

@@ -11,16 +11,14 @@
 #include "base/camera_lens.h"
 
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
-#include "base/camera_lens_radial.h"
-#include "base/clones.h"
+#include "base/camera_lens_undistort.h"
 #include "base/vec.h"
 
-/* Accepted reprojection error of an inversion: absolute part in pixels, and a relative one for points far
-   outside the image. */
-static const double converged_px = 1e-10, converged_relative = 1e-14;
+#define NUMBER double
+#define TERMS(name) lens_##name
+#include "base/camera_lens_terms.inc.h"
 
 void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, double tan_half[2])
 {
@@ -33,36 +31,6 @@ void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, do
     tan_half[1] = height / (2 * (turn ? lens->fy / PI : lens->fy));
 }
 
-/* Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the
-   map p + extra(p). */
-static void extra_terms(const camera_lens *lens, double x, double y, double out[2], double jacobian[4])
-{
-    const double r2 = x * x + y * y, tx = lens->tangent_x, ty = lens->tangent_y, *s = lens->prism;
-    out[0] = tx * (r2 + 2 * x * x) + 2 * ty * x * y + (s[0] + s[1] * r2) * r2;
-    out[1] = ty * (r2 + 2 * y * y) + 2 * tx * x * y + (s[2] + s[3] * r2) * r2;
-    const double px = 2 * (s[0] + 2 * s[1] * r2), py = 2 * (s[2] + 2 * s[3] * r2);
-    jacobian[0] = 1 + 6 * tx * x + 2 * ty * y + px * x;
-    jacobian[1] = 2 * tx * y + 2 * ty * x + px * y;
-    jacobian[2] = 2 * ty * x + 2 * tx * y + py * x;
-    jacobian[3] = 1 + 6 * ty * y + 2 * tx * x + py * y;
-}
-
-/* One stage that mixes x and y: p f(|p|^2) + extra(p), with f = 1 when the radial part is a stage of its
-   own. */
-static void mixed_stage(const camera_lens *lens, const double p[2], double out[2], double jacobian[4])
-{
-    double d_factor = 0, factor = 1;
-    if (!lens->extra_last)
-        factor = camera_lens_radial(lens, p[0] * p[0] + p[1] * p[1], &d_factor);
-    extra_terms(lens, p[0], p[1], out, jacobian);
-    out[0] += p[0] * factor;
-    out[1] += p[1] * factor;
-    jacobian[0] += factor - 1 + 2 * d_factor * p[0] * p[0];
-    jacobian[1] += 2 * d_factor * p[0] * p[1];
-    jacobian[2] += 2 * d_factor * p[0] * p[1];
-    jacobian[3] += factor - 1 + 2 * d_factor * p[1] * p[1];
-}
-
 /* Both eigenvalues have a positive real part: the map has not folded over. */
 static bool unfolded(const double j[4]) { return j[0] * j[3] - j[1] * j[2] > 0 && j[0] + j[3] > 0; }
 
@@ -73,160 +41,16 @@ static bool distort(const camera_lens *lens, double p[2])
     if (!(sqrt(r2) <= lens->radius_max))
         return false;
     if (lens->radial && (!lens->extra || lens->extra_last)) {
-        const double factor = camera_lens_radial(lens, r2, &d_factor);
+        const double factor = lens_radial(lens, r2, &d_factor);
         p[0] *= factor;
         p[1] *= factor;
     }
     if (!lens->extra)
         return true;
-    mixed_stage(lens, p, out, jacobian);
+    lens_mixed(lens, p, out, jacobian);
     p[0] = out[0];
     p[1] = out[1];
     return unfolded(jacobian);
-}
-
-/* Accepted distance between a wanted distorted point and the one reached, in units of the plane. */
-static double tolerance_of(const camera_lens *lens, double radius)
-{
-    return converged_px / fmax(lens->fx, lens->fy) + converged_relative * radius;
-}
-
-/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking
-   bracket. Ends after a step that is at most `enough` of the radius, which 0 never is; then how near it came
-   is not asked. */
-static bool invert_radius(const camera_lens *lens, double wanted, double enough, double *radius)
-{
-    if (!(wanted <= lens->distorted_max))
-        return false;
-    double lo = 0, hi = lens->radius_max, r = wanted < hi ? wanted : hi, residual = 0;
-    for (int i = 0; i < 200; i++) {
-        double d_factor;
-        const double factor = camera_lens_radial(lens, r * r, &d_factor);
-        residual = r * factor - wanted;
-        const double step = residual / (factor + 2 * r * r * d_factor);
-        if (fabs(step) <= 2e-16 * r || residual == 0)
-            break;
-        if (residual > 0)
-            hi = r;
-        else
-            lo = r;
-        const bool last = fabs(step) <= enough * r;
-        r = r - step > lo && r - step < hi ? r - step : 0.5 * (lo + hi);
-        if (last)
-            break;
-    }
-    *radius = r;
-    return enough > 0 || fabs(residual) <= tolerance_of(lens, wanted);
-}
-
-/* 256 bits: GCC takes wider vectors apart value by value where the processor has none. */
-enum { LANES = 4 };
-typedef double lanes4 __attribute__((vector_size(32)));
-typedef int64_t mask4 __attribute__((vector_size(32)));
-#define PICK(mask, yes, no) ((lanes4)(((mask) & (mask4)(yes)) | (~(mask) & (mask4)(no))))
-
-/* invert_radius() with `enough` 0 of several at a time, the same operations on each; -1 where it fails. */
-FASTEST_CLONE static void invert_radii(const camera_lens *lens, const double wanted_radii[LANES],
-                                       double radii[LANES])
-{
-    const lanes4 zero = {0}, most = zero + lens->radius_max;
-    lanes4 wanted, lo = zero, hi = most, residual = zero;
-    memcpy(&wanted, wanted_radii, sizeof wanted);
-    const mask4 within = wanted <= lens->distorted_max;
-    mask4 active = within;
-    lanes4 r = PICK(wanted < most, wanted, most);
-    for (int i = 0; i < 200 && (active[0] | active[1] | active[2] | active[3]) != 0; i++) {
-        const lanes4 x = r * r;
-        lanes4 n = zero, dn = zero, d = zero, dd = zero;
-        for (int k = lens->numerator_count - 1; k >= 0; k--) {
-            dn = dn * x + n;
-            n = n * x + lens->numerator[k];
-        }
-        lanes4 factor = n, d_factor = dn;
-        if (lens->denominator_count > 1) {
-            for (int k = lens->denominator_count - 1; k >= 0; k--) {
-                dd = dd * x + d;
-                d = d * x + lens->denominator[k];
-            }
-            factor = n / d;
-            d_factor = (dn - factor * dd) / d;
-        }
-        residual = PICK(active, r * factor - wanted, residual);
-        const lanes4 step = residual / (factor + 2 * r * r * d_factor);
-        active &= ~((PICK(step < 0, -step, step) <= 2e-16 * r) | (residual == 0));
-        hi = PICK(active & (residual > 0), r, hi);
-        lo = PICK(active & ~(residual > 0), r, lo);
-        const lanes4 next = r - step;
-        r = PICK(active, PICK((next > lo) & (next < hi), next, 0.5 * (lo + hi)), r);
-    }
-    const lanes4 tolerance = tolerance_of(lens, 0) + converged_relative * wanted;
-    r = PICK(within & (PICK(residual < 0, -residual, residual) <= tolerance), r, zero - 1);
-    memcpy(radii, &r, sizeof r);
-}
-
-static bool invert_radial(const camera_lens *lens, double enough, double p[2])
-{
-    const double wanted = dvec_length2(p[0], p[1]);
-    double radius;
-    if (!invert_radius(lens, wanted, enough, &radius))
-        return false;
-    if (wanted > 0) {
-        p[0] *= radius / wanted;
-        p[1] *= radius / wanted;
-    }
-    return true;
-}
-
-/* Newton on the 2x2 Jacobian from `p`, each step halved until it comes nearer; ends when rounding stops all
-   progress. */
-static bool invert_mixed(const camera_lens *lens, const double wanted[2], double p[2])
-{
-    double out[2], j[4];
-    mixed_stage(lens, p, out, j);
-    double rx = out[0] - wanted[0], ry = out[1] - wanted[1];
-    /* No step comes nearer than this, so none need be halved in search of one. */
-    const double rounding = 5e-16 * (fabs(wanted[0]) + fabs(wanted[1]));
-    for (int i = 0; i < 50 && fabs(rx) + fabs(ry) > rounding; i++) {
-        const double determinant = j[0] * j[3] - j[1] * j[2];
-        const double step_x = (j[3] * rx - j[1] * ry) / determinant,
-                     step_y = (j[0] * ry - j[2] * rx) / determinant;
-        bool nearer = false;
-        for (double part = 1; part > 1e-3 && !nearer; part *= 0.5) {
-            const double tried[2] = {p[0] - part * step_x, p[1] - part * step_y};
-            double tried_j[4];
-            mixed_stage(lens, tried, out, tried_j);
-            const double tx = out[0] - wanted[0], ty = out[1] - wanted[1];
-            nearer = tx * tx + ty * ty < rx * rx + ry * ry;
-            if (nearer) {
-                p[0] = tried[0];
-                p[1] = tried[1];
-                rx = tx;
-                ry = ty;
-                memcpy(j, tried_j, sizeof j);
-            }
-        }
-        if (!nearer)
-            break;
-    }
-    return dvec_length2(rx, ry) <= tolerance_of(lens, dvec_length2(wanted[0], wanted[1])) && unfolded(j);
-}
-
-static bool undistort(const camera_lens *lens, double p[2])
-{
-    if (lens->extra) {
-        const double wanted[2] = {p[0], p[1]};
-        if (lens->radial && !lens->extra_last && !invert_radial(lens, 1e-3, p)) {
-            /* The extra terms may reach a little beyond the radial range: start inside it. */
-            const double scale = 0.9 * lens->radius_max / dvec_length2(wanted[0], wanted[1]);
-            p[0] = wanted[0] * scale;
-            p[1] = wanted[1] * scale;
-        }
-        if (!invert_mixed(lens, wanted, p))
-            return false;
-    }
-    if (lens->radial && (!lens->extra || lens->extra_last) && !invert_radial(lens, 0, p))
-        return false;
-    return dvec_length2(p[0], p[1]) <= lens->radius_max;
 }
 
 /* A coordinate that is not a number, or whose square is not, has no ray. */
@@ -300,8 +124,14 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         break;
     case LENS_PERSPECTIVE:
     case LENS_FISHEYE:
-        if ((lens->radial || lens->extra) && !undistort(lens, p))
-            return false;
+        if (lens->radial || lens->extra) {
+            double x[UNDISTORT_LANES] = {p[0]}, y[UNDISTORT_LANES] = {p[1]};
+            camera_lens_undistort(lens, x, y);
+            p[0] = x[0];
+            p[1] = y[0];
+            if (isnan(p[0]))
+                return false;
+        }
         break;
     case LENS_FOV:
         if (!unproject_fov(lens, p))
@@ -326,25 +156,23 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
 
 void camera_lens_unproject_row(const camera_lens *lens, double py, int count, double *dir)
 {
-    if (!lens->radial || lens->extra) {
+    if (!lens->radial && !lens->extra) {
         for (int i = 0; i < count; i++, dir += 3)
             if (!camera_lens_unproject(lens, i + 0.5, py, dir))
                 memset(dir, 0, 3 * sizeof *dir);
         return;
     }
-    for (int first = 0; first < count; first += LANES) {
-        double p[LANES][2], wanted[LANES], radius[LANES];
-        for (int l = 0; l < LANES; l++) {
-            p[l][0] = (first + l + 0.5 - lens->cx) / lens->fx;
-            p[l][1] = (py - lens->cy) / lens->fy;
-            wanted[l] = is_usable(p[l]) ? dvec_length2(p[l][0], p[l][1]) : (double)NAN;
+    for (int first = 0; first < count; first += UNDISTORT_LANES) {
+        double x[UNDISTORT_LANES], y[UNDISTORT_LANES];
+        for (int l = 0; l < UNDISTORT_LANES; l++) {
+            const double p[2] = {(first + l + 0.5 - lens->cx) / lens->fx, (py - lens->cy) / lens->fy};
+            x[l] = is_usable(p) ? p[0] : (double)NAN;
+            y[l] = p[1];
         }
-        invert_radii(lens, wanted, radius);
-        for (int l = 0; l < LANES && first + l < count; l++, dir += 3) {
-            const double scale = wanted[l] > 0 ? radius[l] / wanted[l] : 1;
-            const double q[2] = {p[l][0] * scale, p[l][1] * scale};
-            if (!(radius[l] >= 0 && dvec_length2(q[0], q[1]) <= lens->radius_max &&
-                  unit_direction(lens, q, 1, dir)))
+        camera_lens_undistort(lens, x, y);
+        for (int l = 0; l < UNDISTORT_LANES && first + l < count; l++, dir += 3) {
+            const double q[2] = {x[l], y[l]};
+            if (isnan(q[0]) || !unit_direction(lens, q, 1, dir))
                 memset(dir, 0, 3 * sizeof *dir);
         }
     }

@@ -4,9 +4,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/camera_lens_radial.h"
 #include "base/poly.h"
 #include "base/vec.h"
+
+#define NUMBER double
+#define TERMS(name) lens_##name
+#include "base/camera_lens_terms.inc.h"
 
 /* A perspective ray flatter than this (1e-6 rad from the image plane) is outside every real image. */
 static const double perspective_radius_max = 1e6;
@@ -31,7 +34,7 @@ static void find_monotone_range(camera_lens *lens, double radius_limit)
     } else {
         lens->radius_max = turn < limit ? sqrt(turn) : radius_limit;
         lens->distorted_max =
-            lens->radius_max * camera_lens_radial(lens, lens->radius_max * lens->radius_max, &d_factor);
+            lens->radius_max * lens_radial(lens, lens->radius_max * lens->radius_max, &d_factor);
     }
 }
 

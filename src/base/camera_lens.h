@@ -53,7 +53,7 @@ static inline bool camera_lens_looks_forward(const camera_lens *lens)
 bool camera_lens_unproject(const camera_lens *lens, double px, double py, double dir_cam[3]);
 
 /** camera_lens_unproject() of the first `count` pixel centres of a row, same bits: dir [count][3], 0 where
-    there is no ray. A lens that is radial alone takes several pixels at a time. */
+    there is no ray. A distorted lens takes several pixels at a time. */
 void camera_lens_unproject_row(const camera_lens *lens, double py, int count, double *dir);
 
 bool camera_lens_project(const camera_lens *lens, const double point_cam[3], double pixel[2]);

@@ -115,6 +115,11 @@ gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3
     return GBT_OK;
 }
 
+/* One in so many points may be nearer than the depth that counts as the nearest: they may be wrong. Lenses
+   that look to all sides see some five times as much of the scene, and a thing beside them has fewer of the
+   points. */
+enum { NEARER_POINTS = 100, NEARER_POINTS_ALL_AROUND = 500 };
+
 gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err)
 {
     float *depths = mem_alloc(view->seen_count, sizeof *depths, "depths", err);
@@ -135,7 +140,8 @@ gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double 
             depths[count++] = (float)z;
     }
     qsort(depths, count, sizeof *depths, compare_floats);
-    *depth = count > 0 ? (double)depths[(count - 1) / 100] : 0;
+    const size_t nearer = all_around ? NEARER_POINTS_ALL_AROUND : NEARER_POINTS;
+    *depth = count > 0 ? (double)depths[(count - 1) / nearer] : 0;
     mem_free(depths);
     return GBT_OK;
 }

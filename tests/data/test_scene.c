@@ -11,6 +11,7 @@
 #include "data/colmap_write.h"
 #include "data/photo_size.h"
 #include "data/ply.h"
+#include "data/raw.h"
 #include "data/scene.h"
 #include "gbtrace/progress.h"
 
@@ -1231,6 +1232,36 @@ static void fox_twice(void **state)
     scene_free(&b);
 }
 
+/* One in a hundred points may be nearer, one in five hundred where the lens looks to all sides. */
+static void nearest_depth_leaves_out_some(void **state)
+{
+    (void)state;
+    enum { COUNT = 1000 };
+    static double position[3 * COUNT];
+    static uint32_t seen[COUNT];
+    for (int i = 0; i < COUNT; i++) {
+        position[3 * i + 2] = COUNT - i; /* depths 1 to COUNT, the farthest first */
+        seen[i] = (uint32_t)i;
+    }
+    const raw_scene raw = {.point_count = COUNT, .position = position};
+    raw_view view = {.camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE,
+                                .width = 64,
+                                .height = 48,
+                                .params = {50, 32, 24},
+                                .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}},
+                     .seen = seen,
+                     .seen_count = COUNT};
+    double depth;
+    assert_ok(raw_nearest_depth(&raw, &view, &depth, NULL));
+    assert_true(depth == 10);
+    view.camera.model = GBT_CAMERA_SIMPLE_RADIAL_FISHEYE;
+    assert_ok(raw_nearest_depth(&raw, &view, &depth, NULL));
+    assert_true(depth == 2);
+    view.seen_count = 0;
+    assert_ok(raw_nearest_depth(&raw, &view, &depth, NULL));
+    assert_true(depth == 0);
+}
+
 int main(void)
 {
     enum { REAL_COUNT = sizeof real_cases / sizeof real_cases[0] };
@@ -1262,6 +1293,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(photos, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(photo_alpha_and_nan, folder_make, folder_remove),
         cmocka_unit_test(fox_twice),
+        cmocka_unit_test(nearest_depth_leaves_out_some),
     };
     static struct CMUnitTest real[REAL_COUNT];
     for (size_t i = 0; i < REAL_COUNT; i++)

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* base/camera.c -- a camera's rays and pixels; the same camera at other sizes. */
-#include <math.h>
-
 #include "base/camera_lens.h"
 #include "base/camera_model.h"
 #include "base/camera_pose.h"

@@ -83,8 +83,8 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
 gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3], gbt_error *err);
 
 /** How near the points in its photo come: the first percentile of their depths, for some are wrong; where the
-    lens looks beside and behind itself, too, the fifth part of a percentile of their distances. 0 where none
-   is in front of the camera. */
+    lens looks beside and behind itself, too, the fifth part of a percentile of their distances. 0: none is in
+    front of the camera. */
 gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err);
 
 /** A relative path of 1..RAW_NAME_LIMIT bytes without control characters and without a ".." part. `what` is

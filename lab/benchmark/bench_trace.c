@@ -54,8 +54,9 @@ typedef struct measured {
     bench_way ways[KERNELS_MAX];
     bench_splat splat;
     bench_error error[KERNELS_MAX]; /* when checked: to the reference with the same cut-offs, */
-    bench_error whole[KERNELS_MAX]; /* and to the one without */
-    size_t count, check_rays;
+    bench_error steady[KERNELS_MAX]; /* on the rays outside of the rounding band, */
+    bench_error whole[KERNELS_MAX];  /* and to the one without, on all */
+    size_t count, check_rays, steady_rays;
 } measured;
 
 enum { ROW_COUNT = 25 };
@@ -140,10 +141,11 @@ static void print_figures(const measured *m, FILE *out)
     }
     for (size_t k = 0; m->def->check && k < m->count; k++)
         fprintf(out,
-                "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g; to the one without "
-                "cut-offs: PSNR %.1f dB, max error %.3g\n",
+                "%s to the double reference (%zu rays): PSNR %.1f dB, max error %.3g; on the %zu rays where "
+                "rounding decides nothing: PSNR %.1f dB, max error %.3g; to the one without cut-offs: "
+                "PSNR %.1f dB, max error %.3g\n",
                 bench_kernel_name(m->kernel[k]), m->check_rays, m->error[k].psnr, m->error[k].max,
-                m->whole[k].psnr, m->whole[k].max);
+                m->steady_rays, m->steady[k].psnr, m->steady[k].max, m->whole[k].psnr, m->whole[k].max);
 }
 
 static json_t *way_to_json(const measured *m, size_t way)
@@ -160,6 +162,8 @@ static json_t *way_to_json(const measured *m, size_t way)
     if (m->def->check) {
         json_object_set_new(out, "psnr_to_reference", json_number(m->error[way].psnr));
         json_object_set_new(out, "max_error", json_number(m->error[way].max));
+        json_object_set_new(out, "psnr_outside_rounding_band", json_number(m->steady[way].psnr));
+        json_object_set_new(out, "max_error_outside_rounding_band", json_number(m->steady[way].max));
         json_object_set_new(out, "psnr_without_cuts", json_number(m->whole[way].psnr));
         json_object_set_new(out, "max_error_without_cuts", json_number(m->whole[way].max));
     }
@@ -185,17 +189,24 @@ static gbt_status save_figures(const measured *m, gbt_error *err)
     return status;
 }
 
+static void compare(const measured *m, const bench_reference *want, bench_error error[KERNELS_MAX])
+{
+    for (size_t k = 0; k < m->count; k++)
+        error[k] = bench_reference_compare(want, &m->ways[k].rgb);
+}
+
 static gbt_status check(measured *m, const bench_scene *traced, bench_reference *want, gbt_error *err)
 {
     const trace_settings without = bench_settings_without_cuts(&traced->settings);
-    const trace_settings *const settings[] = {&traced->settings, &without};
-    bench_error *const errors[] = {m->error, m->whole};
-    for (int i = 0; i < 2; i++) {
-        GBT_TRY(bench_reference_make(traced->gaussians, settings[i], &traced->rays, want, err));
-        for (size_t k = 0; k < m->count; k++)
-            errors[i][k] = bench_reference_compare(want, &m->ways[k].rgb);
-    }
+    GBT_TRY(bench_reference_make(traced->gaussians, &without, &traced->rays, want, err));
+    compare(m, want, m->whole);
+    GBT_TRY(bench_reference_make(traced->gaussians, &traced->settings, &traced->rays, want, err));
+    compare(m, want, m->error);
+    GBT_TRY(bench_reference_leave_band(traced->gaussians, &traced->settings, want, err));
+    compare(m, want, m->steady);
     m->check_rays = ray_image_count(&want->rays);
+    for (size_t i = 0; i < m->check_rays; i++)
+        m->steady_rays += !want->left_out[i];
     return GBT_OK;
 }
 

@@ -53,7 +53,7 @@ typedef struct measured {
     int kernel[KERNELS_MAX];
     bench_way ways[KERNELS_MAX];
     bench_splat splat;
-    bench_error error[KERNELS_MAX]; /* when checked: to the reference with the same cut-offs, */
+    bench_error error[KERNELS_MAX];  /* when checked: to the reference with the same cut-offs, */
     bench_error steady[KERNELS_MAX]; /* on the rays outside of the rounding band, */
     bench_error whole[KERNELS_MAX];  /* and to the one without, on all */
     size_t count, check_rays, steady_rays;

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/embree16.h -- packets under Embree's own traversal: every box that is crossed, evaluated, then sorted
-   ray by ray. The baseline that the others are measured against. Included by tree_kernel.inc.h. */
+/* trace/embree16.h -- the baseline kernel: packets of 16 rays under Embree's own traversal.
+
+   Embree reports every Gaussian whose box a ray of the packet crosses, in no order. Each one is evaluated on
+   all 16 rays. The hits are grouped by ray with a counting sort, sorted by depth ray by ray, and blended. The
+   other kernels are measured against this one. Included by tree_kernel.inc.h. */
 #ifndef GBT_TRACE_EMBREE16_H
 #define GBT_TRACE_EMBREE16_H
 
@@ -45,8 +48,8 @@ static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
     }
 }
 
-/* The hits, those of lane 0 first; end[lane]: where those of a lane end. In the place of scratch->rows. NULL
-   without memory. */
+/* Counting sort of the hits by lane; end[lane], 0 on entry, is where those of a lane end. The result takes
+   the place of scratch->rows. NULL when memory ran out. */
 static ray_hit *by_lane(tree_scratch *s, size_t count, size_t end[PACKET_LANES])
 {
     if (mem_reserve((void **)&s->rows, &s->row_capacity, 0, count * (sizeof(ray_hit) / sizeof(float)),

@@ -1,9 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and back: eight Gaussians at a
-   time, in double.
+/* trace/footprint.c -- widen Gaussians by the footprint of a view's pixels, and the adjoint of that.
 
-   Nothing here branches on a lane: where a quantity does not exist, a divisor is replaced and its result not
-   taken. */
+   Per Gaussian (footprint.h has the equations):
+
+     mean --> size p of a pixel there --> w = v p^2 --> squared scales s_i^2 + w
+          --> opacity times sqrt(area before / area after)
+
+   The adjoint computes these quantities again and goes through the chain backwards. Eight Gaussians at a
+   time, in double, without a branch per lane: where a quantity is undefined, the divisor is replaced and a
+   select discards the quotient. */
 #include "trace/footprint.h"
 
 #include <math.h>
@@ -80,7 +85,7 @@ typedef struct gaussian8 {
 
 /* ---- the pixel at a point ---- */
 
-/* Towards points: unit directions, and the distances. */
+/* Unit directions from the camera to points; returns the distances. */
 LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
 {
     for (int k = 0; k < 3; k++)
@@ -91,11 +96,15 @@ LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
     return distance;
 }
 
-/* Pixel size at distance t in direction `dir`, and its gradient by the point. A perspective pixel at an angle
-   theta from the axis has the solid angle cos^3(theta) / f^2, so p = f^-1 z^(3/2) t^(-1/2) with z = t
-   cos(theta). What is behind is seen in mirrors alone, and by one across the axis as if it stood in front; at
-   the sides the cosine is held. Of a panorama columns are closer above and below: a pixel at the latitude phi
-   has cos(phi) times the solid angle of one on the horizon, so p = p_0 t cos^(1/2)(phi). */
+/* Pixel size p at distance t in direction `dir`, and its gradient with respect to the point.
+
+   Perspective: a pixel at the angle theta from the axis has the solid angle cos^3(theta) / f^2, so p = f^-1
+   z^(3/2) t^(-1/2) with z = t cos(theta). Points behind the camera can be seen only in mirrors; a mirror at
+   right angles to the axis shows them as if they stood in front, so |cos(theta)| is taken. Towards the sides
+   it is kept at FOOTPRINT_COSINE_MIN.
+
+   Panorama: columns converge towards the poles. A pixel at the latitude phi has cos(phi) times the solid
+   angle of one on the horizon, so p = p_0 t cos^(1/2)(phi). */
 LANE_CODE d8 pixel_at(const footprint_view *view, d8 t, const d8 dir[3], d8 d_point[3])
 {
     const d8 pixel = d8_set(view->pixel), none = d8_set(0);
@@ -136,14 +145,14 @@ void footprint_pixels(const footprint_view *view, double point[3][LANES], double
 
 /* ---- widening ---- */
 
-/* The squared area across a direction u (local axes) of an ellipsoid with squared half-axes e: det S^2 |S^-1
-   u|^2, without a division. */
+/* The squared area (over pi^2) that an ellipsoid with squared half-axes e shows along a direction u (local
+   axes): det S^2 |S^-1 u|^2, written without a division. */
 LANE_CODE d8 area_square(const d8 u[3], const d8 e[3])
 {
     return u[0] * u[0] * e[1] * e[2] + u[1] * u[1] * e[0] * e[2] + u[2] * u[2] * e[0] * e[1];
 }
 
-/* Its gradients, times `weight`, added. */
+/* Adds the gradients of area_square(), times `weight`. */
 LANE_CODE void area_square_adjoint(const d8 u[3], const d8 e[3], d8 weight, d8 d_e[3], d8 d_u[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -153,13 +162,13 @@ LANE_CODE void area_square_adjoint(const d8 u[3], const d8 e[3], d8 weight, d8 d
     }
 }
 
-/* What forward and adjoint have in common. */
+/* Quantities that the forward pass and the adjoint have in common. */
 typedef struct widening {
     d8 axes[3][3], dir[3], distance, u[3]; /* axes: of the Gaussian, in the world; u: dir in them */
-    d8 w, d_w[3];                          /* added variance, and its gradient by the mean */
+    d8 w, d_w[3];                          /* added variance, and its gradient with respect to the mean */
     d8 e[3], wide[3];                      /* squared scales before and after */
-    d8 area, wide_area, kept;              /* kept: share of the opacity */
-    m8 narrows;                            /* the share is less than 1 */
+    d8 area, wide_area, kept;              /* kept: factor of the opacity */
+    m8 narrows;                            /* that factor is less than 1 */
 } widening;
 
 /* Columns of the rotation matrix. */
@@ -320,7 +329,7 @@ LANE_CODE d8 load_pixel_min(const widen_job *job, size_t i, size_t count)
     return job->pixel_min != NULL ? load(job->pixel_min + i, count) : d8_set(0);
 }
 
-/* What widening replaces, and in the adjoint too. */
+/* The fields that widening replaces; in the adjoint, their gradients. */
 LANE_CODE void store_scale_opacity(gaussians *out, size_t i, size_t count, const gaussian8 *g)
 {
     store(out->scale_x + i, count, g->scale[0]);

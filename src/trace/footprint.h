@@ -34,16 +34,17 @@ typedef struct footprint_view {
     0. */
 footprint_view footprint_view_of(const gbt_camera *camera);
 
-/** The same with the camera's lens as it was prepared; NULL: it sees nothing. */
+/** footprint_view_of() with the prepared lens of the camera; NULL: it sees nothing. */
 footprint_view footprint_view_with(const gbt_camera *camera, const camera_lens *lens);
 
 enum { FOOTPRINT_LANES = 8 };
 
-/** Of the angle to a perspective camera's axis: pixels beyond it, 75.5 degrees, count as of that angle. */
+/** Least cosine of the angle to the axis of a perspective camera: pixels farther out than this angle, 75.5
+    degrees, get the size that they would have at it. */
 #define FOOTPRINT_COSINE_MIN 0.25
 
-/** Sizes of a pixel at points, scene units: the square root of the area that its cone cuts there; of fisheyes
-    the radial size of a pixel. Behind a perspective camera they are those in front of it, mirrored. */
+/** Sizes of a pixel at points, scene units: the square root of the area that its cone cuts there; for
+    fisheyes, the radial size. Behind a perspective camera they are those in front of it, mirrored. */
 void footprint_pixels(const footprint_view *view, double point[3][FOOTPRINT_LANES],
                       double pixel[FOOTPRINT_LANES]);
 
@@ -68,8 +69,8 @@ void footprint_widen(const footprint_view *view, double variance, double pixel_m
 gbt_status footprint_forward(const footprint_view *view, float variance, const float *pixel_min,
                              const gaussians *g, gaussians *out, gbt_error *err);
 
-/** Adjoint of footprint_forward(): `d` holds dL/d(out), and then dL/d(g). The quaternion's is tangent;
-   colours keep theirs. */
+/** Adjoint of footprint_forward() in place: `d` is dL/d(out) on entry and dL/d(g) on return. The gradient of
+    the quaternion is tangent to the unit sphere; those of the colours do not change. */
 void footprint_backward(const footprint_view *view, float variance, const float *pixel_min,
                         const gaussians *g, gaussians *d);
 

@@ -83,7 +83,8 @@ static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uin
     return g;
 }
 
-/* The ray seen from the mean: its point nearest to the mean, p, and how far along that is. */
+/* A ray relative to a mean: p, its point nearest to the mean, as seen from there; the ray is at this point
+   when t = -along. */
 typedef struct ray_to_mean {
     vfloat16 p[3], along;
 } ray_to_mean;
@@ -126,17 +127,17 @@ static inline response respond(const gaussian_lanes *g, const ray_lanes *ray, vf
     return r;
 }
 
-/* The canonical point at an inner t* once more, for the adjoint: v = w' x (x' x w') / |w'|^2 with x' x w' =
-   cof(M) (p x w), M = S^-1 R^T. On a flat Gaussian the v of respond() is a small difference of large numbers
-   along the thin axis. d2 does not feel that, but the gradients of the mean and of the rotation, which are
-   divided by the thin axis, would be noise from a ratio of 1e4 on. */
+/* Computes the canonical point at an interior t* again, for the adjoint: v = w' x (x' x w') / |w'|^2 with x'
+   x w' = cof(M) (p x w), M = S^-1 R^T. On a flat Gaussian the v of respond() is a small difference of large
+   numbers along the thin axis. d2 is not affected by that, but the gradients of the mean and of the rotation,
+   which are divided by the thin axis, would be noise from a ratio of 1e4 on. */
 static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, vfloat16 t_near, response *r)
 {
     const ray_to_mean at = approach(g, ray);
     vfloat16 q[3], c[3], w[3], v[3];
     cross16(at.p, ray->dir, q);
     to_canonical(g, ray->dir, w);
-    for (int i = 0; i < 3; i++) { /* row i of the cofactors is the product of the other two rows */
+    for (int i = 0; i < 3; i++) { /* row i of the cofactors: cross product of the other two rows */
         const vfloat16 *a = g->matrix + 3 * ((i + 1) % 3), *b = g->matrix + 3 * ((i + 2) % 3);
         const vfloat16 cofactor[3] = {vfloat16_sub(vfloat16_mul(a[1], b[2]), vfloat16_mul(a[2], b[1])),
                                       vfloat16_sub(vfloat16_mul(a[2], b[0]), vfloat16_mul(a[0], b[2])),
@@ -150,8 +151,8 @@ static inline void refine_point(const gaussian_lanes *g, const ray_lanes *ray, v
         r->v[i] = vfloat16_select(clipped, r->v[i], vfloat16_div(v[i], ww));
 }
 
-/* E^T v and E^T (v v^T) E of sixteen Gaussians, from the axes E in which their sums were made to their own;
-   in the order of a gradient_record. */
+/* Rotates the moments v and v v^T of sixteen Gaussians from the axes E (rows) in which they were summed to
+   each Gaussian's own: E^T v and E^T (v v^T) E, in the order of a gradient_record. */
 static inline void turn_moments(vfloat16 e[3][3], const vfloat16 v[3], const vfloat16 vv[6],
                                 vfloat16 out[GRADIENT_OPACITY])
 {
@@ -170,7 +171,7 @@ static inline void turn_moments(vfloat16 e[3][3], const vfloat16 v[3], const vfl
     }
 }
 
-/* Direction of the shortest axis, world. */
+/* Unit vector along the shortest axis of the ellipsoid, world: that of the longest row of S^-1 R^T. */
 static inline void shortest_axis(const float *record, float normal[3])
 {
     const float *best = NULL;

@@ -1,5 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/gradients.c -- one record per Gaussian and block; their sum, in the order of the blocks. */
+/* trace/gradients.c -- from the sums that tiles leave to the gradients of the Gaussians' fields.
+
+   Tree: every tile has a list of records, one for each Gaussian that it blended, found by a hash table. A
+   stable counting sort brings the records of all tiles into the order of (Gaussian, tile), in which they are
+   summed. Lists: every pair of Gaussian and tile has a slot; the kernel sums the slots of each record, and
+   the faces are added in their order. Either way the sums of a Gaussian then become gradients of mean, scale
+   and rotation by the formulas of gradients.h. All orders are fixed, so the bits do not depend on the
+   threads. */
 #include "trace/gradients.h"
 
 #include <string.h>
@@ -91,8 +98,9 @@ static inline float masked(float value, uint32_t mask)
 
 enum { MEAN, SCALE = MEAN + 3, QUAT = SCALE + 3, GEOMETRY = QUAT + 4 }; /* as in GAUSSIANS_FIELDS */
 
-/* The gradients of mean, scale and rotation of `count` Gaussians from `first` on, whose sums begin at `from`.
-   m: rows of S^-1 R^T; seen: all bits, or 0: the Gaussian may hold anything, even NaN. */
+/* Gradients of mean, scale and rotation of `count` Gaussians from `first` on, whose sums begin at `from`. m:
+   entries of S^-1 R^T. seen: a mask, all ones, or 0 for a Gaussian that no ray hit: its fields may hold
+   anything, even NaN, and its gradients are 0. */
 FASTEST_CLONE static void find_gradients(const gaussians *g, size_t first, size_t count,
                                          const float (*m)[LANES], const block_sums *sums, size_t from,
                                          const uint32_t *seen, float (*restrict out)[LANES])
@@ -137,7 +145,7 @@ static void write_gradients(const gaussians *g, const float *records, size_t beg
             for (size_t k = 0; k < 9; k++)
                 matrix[k][i] = records[(first + i) * RECORD_FLOATS + RECORD_MATRIX + k];
         find_gradients(g, first, count, (const float(*)[LANES])matrix, sums, at, seen, d);
-        for (int k = 0; k < GAUSSIANS_FIELD_COUNT; k++) /* opacity and colour are in one order in both */
+        for (int k = 0; k < GAUSSIANS_FIELD_COUNT; k++) /* opacity and colour have the same order in both */
             memcpy(to[k] + first, k < GEOMETRY ? d[k] : sums->sum[GRADIENT_OPACITY + k - GEOMETRY] + at,
                    bytes);
         if (weight != NULL)
@@ -178,8 +186,9 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
                         "record order", err));
     GBT_TRY(mem_reserve((void **)&order->first, &order->first_capacity, 0, g->count + 2, sizeof *order->first,
                         "record ranges", err));
-    /* Counting sort, stable: first[id + 2] counts the records of id; first[id + 1] is then the place of the
-       next one, and at last where they end. */
+    /* Stable counting sort: first[id + 2] counts the records of id. After the prefix sum first[id + 1] is
+       where the next record of id goes; when all have been placed, the records of id are first[id] ..
+       first[id + 1] - 1. */
     uint32_t *first = order->first;
     memset(first, 0, (g->count + 2) * sizeof *first);
     for (size_t i = 0; i < list_count; i++)
@@ -207,7 +216,7 @@ typedef struct list_reduction {
     float *weight;
 } list_reduction;
 
-/* The sums of Gaussian `begin` and those after it over all faces, in their order. */
+/* The sums of the Gaussians of a block, from `begin` on, over all faces in their order. */
 static void add_faces(const list_reduction *job, size_t block, size_t begin, block_sums *sums, uint32_t *seen)
 {
     const list_view *view = job->view;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/gradients.h -- the gradient records that blocks of tiles leave, and their sum over the image. */
+/* trace/gradients.h -- the gradient records that tiles leave, and their sum over the image. */
 #ifndef GBT_TRACE_GRADIENTS_H
 #define GBT_TRACE_GRADIENTS_H
 
 #include "base/gaussians.h"
 #include "trace/list_kernel.h"
 
-/** Forget the hash table and cut the array to what is used. GBT_OK or GBT_ERR_NO_MEMORY. */
+/** Free the hash table and trim the array to what is used. GBT_OK or GBT_ERR_NO_MEMORY. */
 gbt_status gradient_list_close(gradient_list *list);
 
 void gradient_list_free(gradient_list *list); /* back to {0} */
@@ -38,7 +38,7 @@ gbt_status gradients_reduce(gradient_order *order, const gradient_list *const *l
                             gbt_error *err);
 
 /**
- * The same from what the tiles of a view left in the slots of their pairs.
+ * gradients_reduce() for lists: from the sums that the tiles of a view left in the slots of their pairs.
  *
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.

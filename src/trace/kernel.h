@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/kernel.h -- what trace.c and its kernels share: the rays of a tile, what they see, the tape, the
+/* trace/kernel.h -- what trace.c and its kernels share: the rays of a tile, their results, the tape, the
    gradient records.
 
    A kernel traces one tile of neighbouring packets of 16 rays: over its list (list_kernel.h) or through the
@@ -40,7 +40,7 @@ typedef struct packet_rays {
     _Alignas(64) float origin[3][PACKET_LANES];
     _Alignas(64) float dir[3][PACKET_LANES];        /* unit; lanes that are not active repeat an active one */
     _Alignas(64) float far[PACKET_LANES];           /* hits at this t_c or behind are not seen */
-    _Alignas(64) float background[3][PACKET_LANES]; /* what each sees behind everything */
+    _Alignas(64) float background[3][PACKET_LANES]; /* background colour of each ray */
     /* with tile_rays.parts, which list kernels know: */
     _Alignas(64) float near[PACKET_LANES], T_front[PACKET_LANES]; /* see ray_image */
     unsigned active; /* bit per lane; 0: the packet is not traced */
@@ -49,19 +49,19 @@ typedef struct packet_rays {
 typedef struct packet_output {
     _Alignas(64) float rgb[3][PACKET_LANES]; /* with the background */
     _Alignas(64) float transmittance[PACKET_LANES];
-    unsigned ended; /* bit per lane, of parts of rays: it ended before a hit, by transmittance_min */
+    unsigned ended; /* for parts of rays: bit per lane that transmittance_min stopped in front of a hit */
     /* with kernel_scene.extra; see trace_outputs */
     _Alignas(64) float weighted_depth[PACKET_LANES], weight[PACKET_LANES]; /* sums of T alpha t and T alpha */
     _Alignas(64) float median_depth[PACKET_LANES], normal[3][PACKET_LANES], hit_count[PACKET_LANES];
     _Alignas(64) uint32_t strongest[PACKET_LANES];
 } packet_output;
 
-/* What forward leaves for backward, per tile: the Gaussians that were blended; through the tree closed by
-   TAPE_END. */
+/* The tape: what the forward pass of a tile leaves for the adjoint, one entry for each Gaussian that a packet
+   (or a single ray) blended. Tree kernels close it with TAPE_END. */
 enum { TAPE_SINGLE = 0x4000, TAPE_END = 0x8000 };
-/* Over lists a packet's number has TAPE_BACK bits; above them stands how many of the packet's entries the row
-   goes back past (list_rows16.h), as far as they are more than two; TAPE_SORTED: T is to be found by sorting.
- */
+/* List kernels have the packet's number in the low TAPE_BACK bits of tape_entry.packet. The bits above say
+   how many of the packet's entries the row steps back past (list_rows16.h), if these are more than two;
+   TAPE_SORTED: T has to be found by sorting. */
 enum { TAPE_BACK = 4, TAPE_SORTED = 0xFFFF >> TAPE_BACK };
 typedef struct tape_entry {
     uint32_t id;
@@ -100,8 +100,8 @@ static inline bool tape_add(hit_tape *tape, tape_entry entry)
     return true;
 }
 
-/* What one tile adds to the gradient of one Gaussian. The sums are of one hit's v (canonical point), h =
-   dL/d(d2), and so on. */
+/* What one tile adds to the gradient of one Gaussian: sums over its hits of expressions in v, the canonical
+   point, and h = dL/d(d2). */
 enum {
     GRADIENT_V = 0,
     GRADIENT_VV = 3,
@@ -142,8 +142,9 @@ typedef struct ray_hit {
 typedef struct tile_rays {
     packet_rays packet[TILE_PACKETS];
     bool common_origin;               /* all of them start at one point */
-    bool parts;                       /* each sees a part of its way alone */
-    uint16_t elsewhere[TILE_PACKETS]; /* bit per lane: its pixel is another face's (list_view.h) */
+    bool parts;                       /* only a part of each ray is traced: near <= t_c < far */
+    uint16_t elsewhere[TILE_PACKETS]; /* bit per lane whose pixel belongs to another part of the tile
+                                         (list_view.h) */
 } tile_rays;
 
 #endif

@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list16.h -- the Gaussians of one tile: read from the view's records about the middle of the tile, put
-   in the order of their depth there, and tested against the packets. Included by list_kernel.inc.h. */
+/* trace/list16.h -- the list of one part of a tile: load, sort by depth, cull against packets.
+
+   load_list() copies the records of the part's Gaussians, with slopes relative to the middle of the tile;
+   finds a depth for each, by which it sorts them (long lists by radix sort, short ones by counting smaller
+   keys), and a lower bound of the depth anywhere in the tile. list->nearest[] holds the smallest bound from
+   each sixteen on: a packet may stop there when its rays became opaque before it. rows_in_packet() tests
+   sixteen ellipses at once against the slopes of a packet. Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST16_H
 #define GBT_TRACE_LIST16_H
 
@@ -17,15 +22,17 @@ typedef struct tile_gaussian {
 enum { PAIR_GENERAL = 1u << 31 };
 _Static_assert(sizeof(tile_gaussian) == 64, "a cache line");
 
-/* Where the Gaussians can be hit, one array each, in their order. */
+/* The ellipses in which the Gaussians can be hit, in list order, one array per field: centre, factor
+   (list_outline), and the coefficients with which x = ACROSS y minimises the form along a, y = DOWN x along
+   b. */
 enum { SHAPE_X, SHAPE_Y, SHAPE_CHOL, SHAPE_ACROSS = SHAPE_CHOL + 3, SHAPE_DOWN, SHAPE_FIELDS };
 
 typedef struct tile_list {
-    size_t count;            /* whole sixteens have memory */
+    size_t count;            /* the arrays have room for whole sixteens */
     tile_gaussian *gaussian; /* [count] */
     float *shape[SHAPE_FIELDS];
-    float *nearest; /* [count / 16 and one more] t / |(a, b, 1)| of all hits of a sixteen and those
-                       behind it is larger; the last is infinite */
+    float *nearest; /* [count / 16 and one more] lower bound of t / |(a, b, 1)| of all hits of a sixteen and
+                       those after it; the last is infinite */
     bool any_general;
     uint16_t *general;         /* [sixteens] bit per Gaussian */
     list_ellipsoid *ellipsoid; /* of those that are general */
@@ -34,12 +41,12 @@ typedef struct tile_list {
 /* The rays of a packet as slopes from the middle of the tile. */
 typedef struct packet_slopes {
     _Alignas(64) float a[PACKET_LANES], b[PACKET_LANES], length[PACKET_LANES];
-    slope_box box;      /* of the active ones, and a little more */
-    slope_box face_box; /* the same in the axes of the face */
+    slope_box box;      /* of the active rays, slightly enlarged */
+    slope_box face_box; /* the same, relative to the axis of the face */
 } packet_slopes;
 
-/* Slopes of a packet's rays in the axes of the face, from (middle_a, middle_b): in double from the rays' own
-   directions. */
+/* Slopes of a packet's rays in the axes of the face, relative to `middle`: found in double from the
+   directions of the rays, then rounded. */
 static inline void slope_rays(const list_frame *frame, const packet_rays *rays, const double middle[2],
                               packet_slopes *out)
 {
@@ -144,9 +151,9 @@ static bool reserve_list(list_scratch *scratch, size_t count, list_memory *out)
     return true;
 }
 
-/* t / |(a, b, 1)| where sixteen Gaussians are nearest to the middle of the tile, and a lower bound of it in
-   all of the tile; and SHAPE_ACROSS and SHAPE_DOWN. Gaussians and shapes have been read; those of general
-   ones are set after. */
+/* For sixteen Gaussians that have been read: the key, t / |(a, b, 1)| at the point of the tile nearest to the
+   centre of the outline; a lower bound of t / |(a, b, 1)| in all of the tile; SHAPE_ACROSS and SHAPE_DOWN.
+   Those of general Gaussians are set afterwards. */
 static inline void depth_in_tile(const list_memory *m, size_t first, const float low[2], const float high[2])
 {
     const float *rows[16], *shapes[16];
@@ -182,7 +189,7 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
                                 vfloat16_add(vfloat16_mul(s[3], s[3]), vfloat16_mul(s[4], s[4]))));
 }
 
-/* The same of a general one, on the ray through the middle. */
+/* Key and bound of a general Gaussian; the key is t / |(a, b, 1)| on the ray through the middle. */
 static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_frame *frame,
                                       const double middle[2], const list_memory *m, size_t i)
 {
@@ -200,18 +207,19 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_fram
         along += w * x;
         square += w * w;
     }
-    /* What rounding takes of ww and the root, and of coordinates as in ellipsoid_meets_box(). */
+    /* 1.0001: rounding of ww and of the root; 4e-6: of the coordinates, as in ellipsoid_meets_box() */
     const float near = e->center[2] - 1.0001f * sqrtf(e->ww) -
                        4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2])),
                 t = along / square, t_near = scene->settings.t_near;
-    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > 0.3 (list_faces.c). The order of keys
-       is a first one, so what is cut at t_near, or not ahead, only has to stand in front. */
+    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > 0.3 (list_faces.c). Keys give only a
+       first order: what is cut at t_near, or not ahead, just has to stand in front. */
     m->bound[i] = larger(0.3f * t_near, 0.99999f * near);
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }
 
-/* Numbers by the bits of their keys, then number: whatever else is in the list, two of them have one order.
-   Upper halves are equal where keys are. */
+/* Radix sort of the numbers 0 .. count - 1 by the bits of their keys; it is stable, so the order of two of
+   them does not depend on the rest of the list. A result is (key bits - lowest) << 32 | number: upper halves
+   are equal where keys are. High digits that are all 0 are skipped. */
 static const uint64_t *sort_list(const float *key, size_t count, uint64_t *from, uint64_t *to)
 {
     enum { DIGITS = 4, VALUES = 256 };
@@ -253,13 +261,14 @@ static inline vfloat16 count_where(vmask16 m, vfloat16 count)
 
 enum { RANKED_MOST = 320 };
 
-/* out[place] = bits of a key << 32 | its number, of RANKED_MOST keys at most: as many keys are smaller, or
-   equal and before it. Keys are not negative; room for 16 more is overwritten. Two sixteens are compared
-   once: what is not larger than a later key stands before it. */
+/* Sorts at most RANKED_MOST keys by counting: the place of a key is the number of keys that are smaller, or
+   equal and before it. out[place] = bits of the key << 32 | its number. Keys are not negative; sixteen more
+   behind the last are overwritten. Two sixteens are compared only once: a later key comes after those that
+   are not larger. */
 static void rank_rows(float *key, size_t count, uint64_t *out)
 {
     const vfloat16 zero = vfloat16_set1(0);
-    uint32_t earlier[RANKED_MOST + 16] = {0}; /* sixteens before its own: how many of them come first */
+    uint32_t earlier[RANKED_MOST + 16] = {0}; /* of the sixteens before its own: how many come before it */
     for (size_t i = count; i < count + 16; i++)
         key[i] = INFINITY;
     for (size_t first = 0; first < count; first += 16) {
@@ -290,7 +299,7 @@ static void rank_rows(float *key, size_t count, uint64_t *out)
     }
 }
 
-/* As sort_list(), of keys that are not negative, with room for 16 more. Few are compared all with all, which
+/* sort_list() for keys that are not negative, with room for 16 more. Short lists go to rank_rows(), which
    takes half the time. */
 static const uint64_t *sort_depths(float *key, size_t count, uint64_t *from, uint64_t *to)
 {
@@ -301,7 +310,7 @@ static const uint64_t *sort_depths(float *key, size_t count, uint64_t *from, uin
     return from;
 }
 
-/* Gaussian `i` of the order: number `from` of those read. */
+/* Puts number `from` of the Gaussians that were read into place `i` of the order. */
 static inline void place_shape(const list_memory *m, size_t from, size_t i)
 {
     const tile_gaussian *g = &m->unsorted[from];
@@ -311,7 +320,7 @@ static inline void place_shape(const list_memory *m, size_t from, size_t i)
         list->ellipsoid[i] = m->shape[from].ellipsoid;
         list->general[i / 16] |= (uint16_t)(1u << i % 16);
         for (int k = 0; k < SHAPE_FIELDS; k++)
-            list->shape[k][i] = 0; /* is tested by itself */
+            list->shape[k][i] = 0; /* passes every test; the ellipsoid is tested instead */
         return;
     }
     const list_outline *o = &m->shape[from].outline;
@@ -342,7 +351,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
         read_gaussian(&view->records[pair->record], middle, (uint32_t)i, &m.unsorted[i]);
     }
     const size_t n = (count + 15) & ~(size_t)15;
-    for (size_t i = count; i < n; i++) { /* repeat one, for whole sixteens */
+    for (size_t i = count; i < n; i++) { /* repeat the last one to fill the sixteen */
         m.unsorted[i] = m.unsorted[count - 1];
         m.shape[i] = m.shape[count - 1];
     }
@@ -374,8 +383,10 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
     return true;
 }
 
-/* Which of Gaussians first .. first + 15 reach into a packet. Seen from its pixels, the smallest value of an
-   ellipse's form is at its centre, or on the edge nearest to it across or down. */
+/* Which of Gaussians first .. first + 15 reach into a packet: those whose quadratic form is at most 1
+   somewhere in the box of the packet's slopes. In a box the form is smallest at its centre, if that is
+   inside, else on the edge nearest to the centre in a or that in b. So it is minimised along both lines, each
+   clamped to the box. */
 static inline unsigned rows_in_packet(const tile_list *list, size_t first, const packet_slopes *slopes)
 {
     const slope_box *box = &slopes->box;

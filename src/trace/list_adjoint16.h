@@ -1,18 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_adjoint16.h -- the adjoint of a tile over its list: evaluate what was blended again, follow T to
-   the back and the colour to the front, and add every Gaussian's sums to its slot. Included by
-   list_kernel.inc.h. docs/tracing.md has the formulas. */
+/* trace/list_adjoint16.h -- the adjoint of one part of a tile over its list (docs/tracing.md, "The adjoint").
+
+     tape --> [load_used] the Gaussians that were blended
+     every packet: its entries --> [replay_list] rows evaluated again, T in front of every hit
+         --> [collect_behind] from the last row to the first: what lies behind every hit
+         --> [sum_rows] h and T alpha of every row, summed over the rays in a fixed tree
+     sums of each Gaussian --> the slot of its pair
+         --> [turn_sums] added per record and turned into the Gaussian's own axes
+
+   With packet_order, sum_in_order() does the whole of a packet in one pass from the last row to the first.
+   Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_ADJOINT16_H
 #define GBT_TRACE_LIST_ADJOINT16_H
 
 #include "trace/list_rows16.h"
 
-enum { AHEAD = 12 /* records that are asked for before they are read */ };
+enum { AHEAD = 12 /* how many records ahead are prefetched */ };
 
 /* The Gaussians that a tile has blended. */
 typedef struct used_list {
     tile_gaussian *gaussian; /* [count] */
-    uint32_t *number;        /* [list] place in `gaussian` of those that are used */
+    uint32_t *number;        /* [list] place in `gaussian`; UINT32_MAX: not used */
     size_t count;
 } used_list;
 
@@ -28,8 +36,8 @@ static bool load_used(const list_view *view, size_t part, const double middle[2]
     out->gaussian = (tile_gaussian *)(void *)scratch->list;
     out->number = (uint32_t *)(void *)(scratch->list + 16 * count);
     uint32_t *pair = out->number + count;
-    /* Marked, then numbered: a number for each entry would wait for the counter that the one before stored.
-     */
+    /* Mark first, then number: numbering at once, each entry would wait for the counter that the one before
+       stored. */
     memset(out->number, 0xFF, count * sizeof *out->number);
     for (size_t i = 0; i < tape->count; i++)
         out->number[tape->entries[i].id] = 0;
@@ -51,8 +59,9 @@ static bool load_used(const list_view *view, size_t part, const double middle[2]
     return true;
 }
 
-/* As insert_row(), of row i of the order: how far it goes back is known, so that no branch waits for what it
-   meets there. Rows in front of which it has a hit of a ray that they have, too, go on past it later. */
+/* insert_row() when the tape says how far row i steps back, so that no branch depends on what it meets. Where
+   row i has a hit in front of one of row j, kept[j] becomes i: collect_behind() has to go on from row j as
+   far as that. */
 static inline void insert_again(const packet_hits *rows, insertion *s, const tape_entry *entry, int i,
                                 vfloat16 t, vfloat16 alpha)
 {
@@ -85,7 +94,7 @@ static PASS void replay_list(const packet_pass *p, const used_list *used, const 
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
     out->count = count;
-    const packet_hits rows = *out; /* what stores cannot change */
+    const packet_hits rows = *out; /* a copy: stores cannot change it */
     const tile_gaussian *used_gaussian = used->gaussian;
     const uint32_t *used_number = used->number;
     const vfloat16 a = vfloat16_load(p->slopes.a), b = vfloat16_load(p->slopes.b),
@@ -116,7 +125,8 @@ static PASS void replay_list(const packet_pass *p, const used_list *used, const 
     end_insertion(out, &s);
 }
 
-/* Row i goes on past `other`: what lies behind is added to the one in front. */
+/* The new row passes `other`, which comes later in the order: on every ray the term of the one behind is
+   added to the sum of the one in front. */
 static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
 {
     const vmask16 behind = vfloat16_lt(other->t, now->t);
@@ -124,14 +134,14 @@ static inline void pass_on(const near_row *now, near_row *other, vfloat16 *sum)
     *sum = vfloat16_add_unless(behind, *sum, other->term);
 }
 
-/* What lies behind every hit, with the background: from the last row to the first, as T was found from the
-   first to the last. `before` is used again: sum of the terms of a row and those after it. Only sums of what
-   has been added, so nothing cancels. False when it takes too many steps: `term` and `behind` are then to be
-   found ray by ray. */
+/* What lies behind every hit, g . (sum of T alpha c), with the background: the mirror image of the insertion,
+   from the last row to the first. The array `before` is used again, for the sum of the terms of a row and
+   those after it. Sums are only ever added to, so nothing cancels. False when it takes too many steps: `term`
+   and `behind` must then be found ray by ray. */
 static PASS bool collect_behind(packet_hits *out, const used_list *used, const vfloat16 d_rgb[3],
                                 vfloat16 background)
 {
-    const packet_hits copy = *out, *const rows = &copy; /* what stores cannot change */
+    const packet_hits copy = *out, *const rows = &copy; /* a copy: stores cannot change it */
     const vfloat16 zero = vfloat16_set1(0);
     const tile_gaussian *used_gaussian = used->gaussian;
     const vfloat16 direction[3] = {d_rgb[0], d_rgb[1], d_rgb[2]};
@@ -171,7 +181,7 @@ static PASS bool collect_behind(packet_hits *out, const used_list *used, const v
     return true;
 }
 
-/* The same ray by ray. False when memory ran out. */
+/* collect_behind() ray by ray. False when memory ran out. */
 static bool collect_behind_by_ray(packet_hits *rows, const used_list *used, const vfloat16 d_rgb[3],
                                   vfloat16 background, list_scratch *scratch)
 {
@@ -181,7 +191,7 @@ static bool collect_behind_by_ray(packet_hits *rows, const used_list *used, cons
         row_store(rows->term, i,
                   vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), row_load(rows->alpha, i)),
                                dot_lanes(used->gaussian[rows->number[i]].color, d_rgb)));
-        row_store(rows->behind, i, vfloat16_set1(0)); /* rays without a hit in it read it, too */
+        row_store(rows->behind, i, vfloat16_set1(0)); /* read also on rays that this row does not hit */
     }
     for (int lane = 0; lane < PACKET_LANES; lane++) {
         size_t count;
@@ -198,8 +208,8 @@ static bool collect_behind_by_ray(packet_hits *rows, const used_list *used, cons
     return true;
 }
 
-/* h = dL/d(d2) of a row, and the weight T alpha. alpha = min(alpha_max, o G): from the cap on nothing but
-   the colour has a gradient. */
+/* h = dL/d(d2) = -alpha dL/dalpha / 2 of a row, where alpha dL/dalpha = term - behind alpha / (1 - alpha);
+   and the weight T alpha. Where alpha = min(alpha_max, o G) is capped, only the colour has a gradient. */
 static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_max, vfloat16 *h,
                                  vfloat16 *weight)
 {
@@ -211,8 +221,8 @@ static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_
     *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
-/* The sums of a row over the rays, to those of its Gaussian. Products of lanes eight apart are added as they
-   are multiplied. */
+/* Adds the terms of a row, summed over the rays, to the sums of its Gaussian. Lanes eight apart are added
+   while they are multiplied (vfloat16_fold_product). */
 static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], const vfloat16 d_rgb[3],
                             float *to)
 {
@@ -233,7 +243,7 @@ static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], co
     vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat8_sum_rows(terms)));
 }
 
-/* Those of a row that the form does not hold for. */
+/* add_sums() for a row that view_form16.h does not hold for: v comes from the general form. */
 static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id, vmask16 hit,
                         vfloat16 h, vfloat16 weight, const vfloat16 d_rgb[3], float *to)
 {
@@ -249,14 +259,14 @@ static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint
     add_sums(h, weight, v, d_rgb, to);
 }
 
-/* The sums of all rows. v = R / den z, z = (y, w1 w2, w1 w3); R and the sign of the first come later
-   (turn_sums). */
+/* Adds the sums of all rows. v = R / den (-y, w1 w2, w1 w3) (view_form16.h); the factor R and the sign of the
+   first component are left to turn_sums(), which applies them once per record. */
 static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
                           const packet_hits *from, gradient_slot *sums)
 {
     const kernel_scene *scene = p->scene;
     const packet_rays *rays = p->rays;
-    const packet_hits copy = *from, *const rows = &copy; /* what stores cannot change */
+    const packet_hits copy = *from, *const rows = &copy; /* a copy: stores cannot change it */
     const tile_gaussian *used_gaussian = used->gaussian;
     const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
                    b = vfloat16_load(p->slopes.b), alpha_max = vfloat16_set1(scene->settings.alpha_max),
@@ -294,9 +304,9 @@ static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfl
     }
 }
 
-/* The whole adjoint where the rays have one order, from the last row to the first. `T` is first that behind
-   all rows; in front of a row it is that behind it / (1 - alpha). `behind` is g . B, first of the background.
- */
+/* The whole adjoint of a packet with one order, from the last row to the first. `T` starts as that behind all
+   rows and is divided by 1 - alpha from row to row; `behind` is g . B, B the colour behind the row, and
+   starts as that of the background. */
 static PASS void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry,
                               size_t count, vfloat16 T, vfloat16 behind, const vfloat16 direction[3],
                               gradient_slot *sums)
@@ -407,7 +417,7 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
     return true;
 }
 
-/* The sums of records first .. first + 15 over their tiles, in their order. */
+/* The sums of records first .. first + 15 over their slots, in their order. */
 static inline void gather_slots(const list_view *view, size_t first, size_t end, float sum[16][16])
 {
     for (size_t i = 0; i < 16; i++) {
@@ -423,7 +433,8 @@ static inline void gather_slots(const list_view *view, size_t first, size_t end,
     }
 }
 
-/* From the turned axes of a face to the Gaussians' own. */
+/* Sums of the records [begin, end) over their slots, turned from the axes of view_form16.h into the
+   Gaussians' own. */
 static void turn_sums(const kernel_scene *scene, const list_view *view, const list_face *face, size_t begin,
                       size_t end, block_sums *out)
 {
@@ -460,7 +471,8 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const li
         hvv[4] = vfloat16_sub(zero, hvv[4]);
         hvv[5] = vfloat16_sub(zero, hvv[5]);
         turn_moments(form.e, hv, hvv, to);
-        for (int k = 0; k < 9; k++) /* V, VV; own axes have SLOT_HV and SLOT_HVV in the same order */
+        for (int k = 0; k < 9; k++) /* V, VV: those of general records are in their own axes already, in the
+                                       same order */
             vfloat16_store(out->sum[k] + at,
                            vfloat16_select(vmask16_from_bits(general), sum[SLOT_HV + k], to[k]));
         vfloat16_store(out->sum[GRADIENT_OPACITY] + at,

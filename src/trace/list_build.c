@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_build.c -- lists of the parts of tiles, from the records of a view.
+/* trace/list_build.c -- the list of the Gaussians that each part of a tile may see, for one view.
 
-   rays --> faces, parts and their slopes (list_faces.c)
-   Gaussians --> records of each face (list_kernel.make_records) --> batches of blocks: parts reached, a
-        histogram per batch --> place of each batch in each part --> lists, by index of the Gaussian */
+     rays --> faces, parts and their slopes (list_faces.c)
+     Gaussians --> records of each face (list_kernel.make_records)
+     batches of records --> parts that each record reaches; a histogram over the parts per batch
+     histograms --> where each batch begins in the list of each part --> lists, by index of the Gaussian
+
+   A parallel counting sort: batches and places do not depend on the threads, so neither do the lists. An
+   "entry" is the block of LIST_GRAIN Gaussians of one face. */
 #include "trace/list_build.h"
 
 #include <stdatomic.h>
@@ -15,14 +19,14 @@
 
 enum { BATCHES = 64 };
 
-/* Pairs of Gaussians that need their ellipsoids tested and parts: beyond this the tree is cheaper. Parts of
-   rays are never traced by the tree, whose depths differ in rounding: a hit could be counted twice, or not at
-   all. */
+/* Most pairs of part and general Gaussian, whose ellipsoid has to be tested; with more, the tree is cheaper.
+   The limit does not hold for parts of rays, which never go through the tree: depths round differently there,
+   so that a hit could be counted twice, or not at all. */
 static const size_t general_pairs_most = (size_t)1 << 24;
 
 /* Blocks of records that are put into lists together. */
 typedef struct record_batch {
-    uint32_t *parts; /* of the pairs, record by record */
+    uint32_t *parts; /* the part of each pair, record by record */
     size_t count, capacity;
 } record_batch;
 
@@ -87,8 +91,8 @@ static gbt_status reserve_records(list_builder *lists, size_t count, gbt_error *
     return GBT_OK;
 }
 
-/* Where the records of each entry begin. One face has room for all Gaussians, six for those that may reach
-   into them. */
+/* Where the records of each entry begin. With one face there is room for all Gaussians; with six, for those
+   that may reach into each. */
 static gbt_status place_records(const list_job *job, size_t *total, gbt_error *err)
 {
     list_builder *lists = job->lists;
@@ -123,7 +127,7 @@ static gbt_status make_records_of(list_job *job, gbt_error *err)
 
 /* ---- pairs ---- */
 
-/* The parts of record `at` to the end of the batch's. False when memory ran out. */
+/* Appends the parts in which record `at` may be hit to those of the batch. False when memory ran out. */
 static bool add_parts(const list_job *job, record_batch *batch, const list_face *face, size_t at)
 {
     const size_t most = batch->count + face->part_count + 16;
@@ -171,7 +175,7 @@ static void place_pairs(size_t index, size_t begin, size_t end, void *context)
     }
 }
 
-/* Counts per batch and part become places in the list of all parts. */
+/* Exclusive prefix sum: counts per batch and part become first places in the pairs of all parts. */
 static gbt_status place_batches(const list_job *job, size_t batches, gbt_error *err)
 {
     list_view *view = &job->lists->view;

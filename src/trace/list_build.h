@@ -12,7 +12,7 @@ typedef struct list_builder {
     list_view view;
     struct record_batch *batches; /* internal, as all that follows */
     uint32_t *histogram;          /* [batches][parts] */
-    uint8_t *tile_faces;          /* [tiles] that see the tile, a bit for each */
+    uint8_t *tile_faces;          /* [tiles] bit per face that sees the tile */
     size_t part_capacity, part_box_capacity, box16_capacity, box256_capacity, tile_face_capacity,
         reached_capacity, record_capacity, kept_capacity, pair_capacity, first_capacity, batch_capacity,
         histogram_capacity, slot_capacity, slot_used_capacity;

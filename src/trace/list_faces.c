@@ -1,9 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/list_faces.c -- the faces of a view, the parts of tiles that each of them sees, and their slopes.
 
-   One face, if all rays look into the half space about their middle; else the six of a cube about it. A tile
-   all of whose rays lie well inside one face is that face's; the rays of others each go to the face of their
-   largest component. */
+     rays --> [make_frame] axes about their mean direction
+     all rays within 72 degrees of it: one face, whose parts are the tiles
+     otherwise: the six faces of a cube in these axes
+     parts --> boxes around their slopes, and around those of 16 and 256 parts (list_parts16.h)
+
+   With six faces, a tile all of whose rays lie within 72 degrees of the axis of one face is a part of that
+   face; the rays of other tiles each go to the face of their largest component. */
 #include "trace/list_faces.h"
 
 #include <float.h>
@@ -16,12 +20,13 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 
-/* A face sees rays up to 72 degrees from its axis. */
+/* Cosine of 72 degrees: how far from its axis a face sees rays. */
 static const float component_least = 0.3f;
 
 /* ---- axes ---- */
 
-/* Sum of the sound directions among a few all over the picture, and along its rows. */
+/* Of the valid directions on a grid of pixels all over the picture: their sum, and their change along its
+   rows. */
 static void find_directions(const ray_image *rays, double middle[3], double along[3])
 {
     enum { STEPS = 8 };
@@ -46,7 +51,7 @@ static bool make_frame(const ray_image *rays, list_frame *out)
     find_directions(rays, w, u);
     if (!ray_origin_is_sound(o))
         return false;
-    if (!(dvec_length(w) > 1e-3)) { /* they look everywhere */
+    if (!(dvec_length(w) > 1e-3)) { /* they look in all directions */
         w[0] = w[1] = 0;
         w[2] = 1;
     }
@@ -117,8 +122,8 @@ static const slope_box nothing = {{FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX}};
 
 /* ---- slopes of the parts ---- */
 
-/* The slopes of a part do not depend on which parts of rays are asked for: depths round as those of whole
-   rays. But where no ray sees anything no Gaussian needs to be listed. */
+/* False if no ray of the tile has a part to be traced: no Gaussian needs to be listed then. The slopes of a
+   part of the tile include all of its rays nevertheless, so that depths round as those of whole rays. */
 static bool tile_sees(const ray_image *rays, size_t tile)
 {
     const pixel_range at = tile_pixels(rays, tile);
@@ -140,7 +145,7 @@ typedef struct face_job {
     atomic_bool apart;
 } face_job;
 
-/* Slopes of the part's rays; false when some are too far from the axis. */
+/* Box around the slopes of the part's rays; false when some are too far from the axis. */
 static bool slopes_of_part(const list_view *view, const ray_image *rays, const list_part *part,
                            slope_box *out)
 {
@@ -166,7 +171,7 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const l
         }
     }
     for (int k = 0; k < 2 && box.low[0] <= box.high[0]; k++) {
-        /* 16 ulps of the largest slopes, tan 72 degrees; and more than the packets' boxes are opened by
+        /* 16 ulps of the largest slope, tan 72 degrees; and more than the packets' boxes are enlarged by
            (slope_rays). */
         const float open = 4e-6f + 2e-3f * (box.high[k] - box.low[k]);
         box.low[k] -= open;
@@ -193,7 +198,7 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
 
 /* ---- six faces ---- */
 
-/* Faces of the rays of a tile. */
+/* Bit per face that a ray of the tile belongs to. */
 static unsigned faces_of_rays(const list_frame *frame, const ray_image *rays, const pixel_range *at)
 {
     unsigned faces = 0;
@@ -207,7 +212,8 @@ static unsigned faces_of_rays(const list_frame *frame, const ray_image *rays, co
     return faces;
 }
 
-/* Which faces see a tile: one, if it sees all rays well, best the first; else those of its rays. */
+/* Bit per face that sees a tile: one face if all rays lie within 72 degrees of its axis, the first if it is
+   among these, else the one with the largest margin; if there is none, the faces of the single rays. */
 static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, size_t tile)
 {
     const pixel_range at = tile_pixels(rays, tile);
@@ -224,7 +230,7 @@ static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, si
                 high[k] = component[k] > high[k] ? component[k] : high[k];
             }
         }
-    if (low[2] > component_least) /* all of them, or there is no ray */
+    if (low[2] > component_least) /* all rays, or there are none */
         return 1;
     float most = component_least;
     unsigned best = 0;

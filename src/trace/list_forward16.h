@@ -1,13 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_forward16.h -- a tile over its list: each packet evaluates the rows that reach into it, sixteen
-   at a time without a branch, orders and blends them. Included by list_kernel.inc.h. */
+/* trace/list_forward16.h -- the forward pass of one part of a tile over its list.
+
+     every packet: [gather_rows] the Gaussians that reach into it, evaluated; those that some ray hits are
+   rows
+         --> [order_by_middle, insert_rows] T in front of every hit (list_rows16.h)
+         --> [blend_list] colours, other outputs, the tape
+
+   gather_rows() queues Gaussians until they are sixteen and evaluates these without a branch, four beside
+   each other. It ends when all that is left lies behind where the rays became opaque. Included by
+   list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_FORWARD16_H
 #define GBT_TRACE_LIST_FORWARD16_H
 
 #include "trace/list_rows16.h"
 #include "trace/packet_extra16.h"
 
-/* Rows that reach into a packet, waiting until there are sixteen. */
+/* Gaussians that reach into a packet, waiting until there are sixteen. */
 typedef struct row_queue {
     _Alignas(64) uint32_t number[3 * PACKET_LANES];
     unsigned count;
@@ -16,12 +24,12 @@ typedef struct row_queue {
 /* What the rays of a packet still see. */
 typedef struct ray_limits {
     vfloat16 far;     /* hits at this depth or behind are not seen */
-    vfloat16 near;    /* nor are hits nearer than this; 0 but for parts of rays */
+    vfloat16 near;    /* hits nearer than this are not seen; 0 except for parts of rays */
     vfloat16 product; /* of 1 - alpha over all hits so far */
     vfloat16 reached; /* the farthest of them */
 } ray_limits;
 
-/* One row more, when it has a hit. */
+/* Appends a row if it has a hit. */
 static inline void append_response(const packet_hits *rows, size_t *count, uint32_t number, row_response r,
                                    vfloat16 alpha_min, vfloat16 alpha_max, ray_limits *limits)
 {
@@ -38,7 +46,7 @@ static inline void append_response(const packet_hits *rows, size_t *count, uint3
     *count += vmask16_any(hit) != 0;
 }
 
-/* `limits`, the rows and pointers are copied, so that compilers know what stores cannot change. */
+/* Local copies of `limits`, the rows and pointers tell the compiler what stores cannot change. */
 static void evaluate_queue(const packet_pass *p, const tile_list *list, const row_queue *queue, unsigned take,
                            packet_hits *out, ray_limits *limits)
 {
@@ -65,7 +73,7 @@ static void evaluate_queue(const packet_pass *p, const tile_list *list, const ro
     *limits = now;
 }
 
-/* All rows that can be seen. */
+/* All rows that rays of the packet may see, in list order. */
 static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet_hits *rows,
                              kernel_counters *counters)
 {
@@ -99,15 +107,15 @@ static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet
             vfloat16_max(vfloat16_mul(limits.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
         limits.far = vfloat16_select(vfloat16_lt(limits.product, opaque), vfloat16_min(limits.far, behind),
                                      limits.far);
-        /* Those that still wait are of this sixteen. */
+        /* What still waits in the queue is of this sixteen. */
         const float nearest = list->nearest[first / 16 + (queue.count == 0)];
         if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), limits.far)))
             break;
     }
 }
 
-/* How far rows go back, into the entries `begin` to `end` of a packet. A row that has none writes into that
-   of the next one, which may go back farther than it has to. */
+/* Writes into entries `begin` .. `end` of a packet past how many entries each row steps back. A row without
+   an entry passes that on to the entry of the next row, which may then step back farther than it has to. */
 static void note_back(const packet_hits *rows, tape_entry *entries, size_t begin, size_t end)
 {
     for (size_t k = 0; k < rows->back_count; k++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_kernel.h -- the contract between list_build.c, trace.c, gradients.c and the kernels over lists.
-   Written once (list_kernel.inc.h) and compiled per instruction set. */
+/* trace/list_kernel.h -- the interface between list_build.c, trace.c, gradients.c and the kernels over lists,
+   which are written once (list_kernel.inc.h) and compiled per instruction set. */
 #ifndef GBT_TRACE_LIST_KERNEL_H
 #define GBT_TRACE_LIST_KERNEL_H
 
@@ -30,17 +30,18 @@ static inline void list_scratch_free(list_scratch *s)
 }
 
 typedef struct list_kernel {
-    /** Set view->reached of the Gaussians of a block. */
+    /** Set view->reached of the Gaussians of a block, and count them in view->kept. */
     void (*find_reached)(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block);
-    /** Write the records of those Gaussians of a block that can be seen through the bounds of a face, in
-       their order. `reached`: bits of those that come into question, a word for sixteen; NULL: all. */
+    /** Write the records of those Gaussians of a block that can be seen within the bounds of a face, in
+        order. `reached`: a word for each sixteen, with a bit per Gaussian that may be seen; NULL: all may
+        be. */
     list_kept (*make_records)(const kernel_scene *scene, const gaussians *g, const list_face *face,
                               size_t block, const uint16_t *reached, list_record *records,
                               list_shape *shapes);
-    /** The parts of a face that a record may be hit in, in their order; returned is how many. There is room
-        for sixteen more than the face has. */
+    /** The parts of a face in which a record may be hit, in order; returns how many. `parts` has room for
+        sixteen more than the face has. */
     size_t (*find_parts)(const list_view *view, const list_face *face, size_t record, uint32_t *parts);
-    /** Trace a part of the view, as a tree_forward_fn does a tile. */
+    /** Trace a part of a tile, as a tree_forward_fn traces a tile. */
     bool (*forward)(const kernel_scene *scene, const list_view *view, size_t part, const tile_rays *rays,
                     packet_output out[TILE_PACKETS], hit_tape *tape, list_scratch *scratch,
                     kernel_counters *counters);

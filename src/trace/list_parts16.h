@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_parts16.h -- the parts of a face that a record may be hit in, sixteen at a time: boxes around
-   sixteen times sixteen of them first. Included by list_kernel.inc.h. */
+/* trace/list_parts16.h -- the parts of a face in which a record may be hit, for all records.
+
+   A search in two levels, sixteen boxes at a time: the box of the record's ellipse against the boxes around
+   sixteen parts each; then, in those that it meets, against the box of each part, and the ellipse itself
+   against what is left. General records are tested against every part. Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_PARTS16_H
 #define GBT_TRACE_LIST_PARTS16_H
 
 #include "trace/list_view.h"
 #include "trace/list_records16.h"
 
-/* Sixteen boxes of slopes as seen from the middle of an ellipse. */
+/* Sixteen boxes of slopes relative to the centre of an ellipse. */
 typedef struct boxes_about {
     vfloat16 left, right, bottom, top;
 } boxes_about;
@@ -21,7 +24,7 @@ static inline boxes_about boxes_from(const box_lanes *boxes, float x, float y)
                          vfloat16_sub(vfloat16_load(boxes->edge[3]), middle_y)};
 }
 
-/* Which of them the box around the ellipse meets. Boxes with nothing in them meet none. */
+/* Which boxes the box around the ellipse meets. Empty boxes meet nothing. */
 static inline vmask16 boxes_meet(const boxes_about *b, const float half[2])
 {
     const vfloat16 zero = vfloat16_set1(0), across = vfloat16_set1(half[0]), down = vfloat16_set1(half[1]);
@@ -44,7 +47,7 @@ static inline vfloat16 clamp_to(vfloat16 a, vfloat16 low, vfloat16 high)
     return vfloat16_min(vfloat16_max(a, low), high);
 }
 
-/* Does the ellipse reach into the boxes? As rows_in_packet of list16.h. */
+/* Which boxes the ellipse reaches into, found as in rows_in_packet() of list16.h. */
 static inline vmask16 ellipse_meets(const boxes_about *b, const float c[3])
 {
     const vfloat16 zero = vfloat16_set1(0), near_x = clamp_to(zero, b->left, b->right),

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_records16.h -- the records of a face of a view, sixteen Gaussians at a time, and where each can
-   be hit.
+/* trace/list_records16.h -- the records of a face of a view, and where each can be hit, sixteen Gaussians at
+   a time.
 
-   With kappa = c / R^2, c the d2 where the response falls to alpha_min, a ray is hit where y <= lambda w1^2,
-   lambda = kappa / (1 - kappa): an ellipse in (a, b) when all of the ellipsoid lies ahead. With p = q1 q4 -
-   q2 q3, P = p^2 + q1^2 q5^2 and S = q3^2 q5^2 its determinant is D = S - lambda P, and everything else is
-   made of sums that do not cancel while lambda P <= 3/4 S. Included by list_kernel.inc.h. */
+   A ray is hit where d2 = R^2 y / den <= c, c being the d2 at which the response falls to alpha_min
+   (view_form16.h defines y, den, w1, R, q1..q5). With kappa = c / R^2 and lambda = kappa / (1 - kappa) that
+   is y <= lambda w1^2: an ellipse in (a, b), if all of the ellipsoid lies ahead. With p = q1 q4 - q2 q3, P =
+   p^2 + q1^2 q5^2 and S = q3^2 q5^2, the determinant of its form is D = S - lambda P, and all else is made of
+   sums that do not cancel while lambda P <= 3/4 S. Where this, or lying ahead, fails, the record is general
+   and keeps its ellipsoid. Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_RECORDS16_H
 #define GBT_TRACE_LIST_RECORDS16_H
 
@@ -13,7 +15,7 @@
 #include "trace/rays.h"
 #include "trace/view_form16.h"
 
-/* Means of sixteen Gaussians in the axes of the view. In double, so that slopes have the digits of the
+/* Means of sixteen Gaussians in the axes of a face; in double, so that slopes keep all digits of the
    coordinates. */
 typedef struct list_means {
     double a[16], b[16];
@@ -62,14 +64,14 @@ static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians 
     return bits;
 }
 
-/* A d2 and a hundred times what rounding takes of it: about 2^-20 of d2 = R^2 y / den, and 2^-22 of alpha,
-   which is 5e-7 of 2 ln alpha. */
+/* A d2 enlarged by a hundred times its rounding errors: about 2^-20 of d2 = R^2 y / den, and 2^-22 of alpha,
+   which is 5e-7 in 2 ln alpha. */
 static inline vfloat16 open_square(vfloat16 square)
 {
     return vfloat16_fma(square, vfloat16_set1(1.0001f), vfloat16_set1(2e-5f));
 }
 
-/* d2 where sixteen Gaussians end, opened for rounding. */
+/* Largest d2 at which sixteen Gaussians are hit, 2 ln(o / alpha_min), enlarged for rounding. */
 static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opacity, unsigned lanes)
 {
     _Alignas(64) float cut[16] = {0};
@@ -79,7 +81,7 @@ static inline vfloat16 cut_squares(const kernel_scene *scene, const float *opaci
     return open_square(vfloat16_load(cut));
 }
 
-/* The same of opacity 1, or of their own if that is more. */
+/* cut_squares() for opacity 1, or their own if that is more. */
 static inline vfloat16 whole_squares(const kernel_scene *scene, vfloat16 cut)
 {
     return vfloat16_max(cut, open_square(vfloat16_set1(2 * logf(1 / scene->settings.alpha_min))));
@@ -105,7 +107,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     const vfloat16 A = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[0]), q33),
                    B = vfloat16_fnma(lambda, vfloat16_mul(q[0], q[1]), vfloat16_mul(q[2], q[3])),
                    C = vfloat16_div(vfloat16_fma(B, B, D), A);
-    /* 1.001: D >= S / 4, so that D has lost three bits at most, and all roundings come to about 1e-5. */
+    /* 1.001 covers the rounding of about 1e-5: as D >= S / 4, the difference loses three bits at most. */
     const vfloat16 inverse = vfloat16_div(one, D), share = vfloat16_mul(lambda, inverse),
                    G = vfloat16_mul(S, inverse),
                    s = vfloat16_mul(vfloat16_mul(lambda, vfloat16_set1(1.001f)), G);
@@ -127,7 +129,7 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     const vmask16 small =
         vmask16_and(vfloat16_lt(kappa, vfloat16_set1(0.5f)),
                     vfloat16_lt(vfloat16_mul(lambda, P), vfloat16_mul(vfloat16_set1(0.75f), S)));
-    /* The adjoint squares R and y twice. */
+    /* The adjoint squares R and y twice: these limits keep that finite. */
     const vmask16 sound = vmask16_and(
         vmask16_and(form->sound, vmask16_and(vfloat16_lt(vfloat16_set1(1e-30f), S),
                                              vfloat16_lt(form->falloff, vfloat16_set1(1e14f)))),
@@ -139,8 +141,8 @@ static inline outline_lanes find_outlines(const kernel_scene *scene, const view_
     return o;
 }
 
-/* Covariances of sixteen ellipsoids in the axes of the view: k^2 times the sum of the scaled axes' squares.
- */
+/* Centres and covariances of sixteen ellipsoids in the axes of the face. A covariance is `cut` times the sum
+   of the squares (outer products) of the scaled axes. */
 static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *frame, const float at[3][16],
                                    vfloat16 cut, vfloat16 out[8])
 {
@@ -149,8 +151,7 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *fr
     for (int r = 0; r < 3; r++)
         for (int k = 0; k < 3; k++)
             dual[r][k] = (float)frame->dual[r][k];
-    for (int k = 0; k < 3; k++) { /* row k of the matrix is the axis over its length: over its square, scaled
-                                   */
+    for (int k = 0; k < 3; k++) { /* row k is axis k over s_k; divided by its square, axis k times s_k */
         const vfloat16 inverse = vfloat16_div(vfloat16_set1(1), dot16(g->matrix + 3 * k, g->matrix + 3 * k));
         for (int r = 0; r < 3; r++)
             axis[r][k] = vfloat16_mul(dot_lanes(dual[r], g->matrix + 3 * k), inverse);
@@ -162,15 +163,16 @@ static inline void find_ellipsoids(const gaussian_lanes *g, const list_frame *fr
     out[5] = vfloat16_mul(cut, dot16(axis[2], axis[2]));
     out[6] = vfloat16_mul(cut, dot16(axis[0], axis[2]));
     out[7] = vfloat16_mul(cut, dot16(axis[1], axis[2]));
-    /* Twenty roundings or so, 2^-21 together; ellipsoid_meets_box() sees 1 + slope^2 times that, 11 at most
-     */
+    /* About twenty roundings, 2^-21 together; ellipsoid_meets_box() multiplies them by 1 + slope^2, 11 at
+       most */
     const vfloat16 slack =
         vfloat16_mul(vfloat16_set1(0x1p-17f), vfloat16_add(out[3], vfloat16_add(out[4], out[5])));
     for (int k = 3; k < 6; k++)
         out[k] = vfloat16_add(out[k], slack);
 }
 
-/* Bounding spheres of sixteen Gaussians against the planes of each face, a little opened for rounding. */
+/* Tests bounding spheres of the Gaussians of a block, slightly enlarged for rounding, against the planes of
+   each face. */
 static void find_reached(const kernel_scene *scene, const gaussians *g, list_view *view, size_t block)
 {
     const vfloat16 one = vfloat16_set1(1);
@@ -219,12 +221,12 @@ static void find_reached(const kernel_scene *scene, const gaussians *g, list_vie
     }
 }
 
-/* What sixteen Gaussians are in the axes of a face. */
+/* Sixteen Gaussians in the axes of a face. */
 typedef struct record_lanes {
     list_means means;
     _Alignas(64) float q[5][16], falloff[16], outline[8][16], ellipsoid[8][16]; /* fields of list_shape */
     unsigned holds; /* bit per Gaussian: its form holds, and it has an outline; else, an ellipsoid */
-    unsigned kept;  /* whose outlines meet the bounds of the face, and all ellipsoids */
+    unsigned kept;  /* bit per Gaussian: its outline meets the bounds of the face, or it has an ellipsoid */
 } record_lanes;
 
 static inline void measure_sixteen(const kernel_scene *scene, const gaussians *g, const list_face *face,
@@ -242,8 +244,9 @@ static inline void measure_sixteen(const kernel_scene *scene, const gaussians *g
     view_form_find(face->frame.axis, &lanes, slope[0], slope[1], depth, &form);
     const vfloat16 cut = cut_squares(scene, g->opacity + first, visible);
     const outline_lanes outline = find_outlines(scene, &form, depth, cut);
-    /* Of copies the form holds for all or for none, however opaque each is: the two formulas of t differ in
-       rounding, and so would their order from ray to ray. */
+    /* Whether the form holds is decided as if the opacity were 1: then it does so for all of several copies
+       or for none. The two formulas for t round differently, and copies would change their order from ray to
+       ray. */
     const vmask16 whole = find_outlines(scene, &form, depth, whole_squares(scene, cut)).holds;
     out->holds = vmask16_bits(whole) & visible;
     vmask16 inside = vmask16_from_bits(out->holds);
@@ -267,7 +270,7 @@ static inline void measure_sixteen(const kernel_scene *scene, const gaussians *g
     }
 }
 
-/* That of lane `i`, which is Gaussian `id`. False when its ellipsoid misses the bounds. */
+/* Writes the record of lane `i`, which is Gaussian `id`. False when its ellipsoid misses the bounds. */
 static inline bool write_record(const gaussians *g, const slope_box *bounds, const record_lanes *m, int i,
                                 size_t id, list_record *record, list_shape *shape)
 {

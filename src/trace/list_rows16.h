@@ -1,11 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/list_rows16.h -- rows of a packet in the exact order of every ray, by insertion.
+/* trace/list_rows16.h -- T in front of every hit of a packet, in the exact order of every ray, by insertion.
 
-   A row is one Gaussian on sixteen rays. Rows are put in the order of their depth on a ray in the middle. On
-   every ray T in front of a hit is the product of 1 - alpha over the hits before it; a row starts from the
-   product over all rows before it in the order, and steps back over them while some ray has a hit there that
-   lies behind its own: on such a ray the other hit's T is multiplied by this row's 1 - alpha; elsewhere this
-   one's by the other's. Hits at the same depth are ordered by index. Included by list_kernel.inc.h. */
+   A row is one Gaussian on the sixteen rays of a packet. Rows are sorted once, by their depth on a ray in the
+   middle; on other rays the order may differ. On every ray T in front of a hit is the product of 1 - alpha
+   over the hits before it. Row i steps back over the rows before it while some ray has a hit there that lies
+   behind its own. In each step, on each ray: if the other hit lies behind, its T is multiplied by 1 - alpha
+   of row i; if it lies in front, 1 - alpha of the other goes into a product. T of row i is that product times
+   the running product over all rows before the last one passed. So T is exact on every ray, and none is
+   sorted. A packet that needs too many steps is sorted ray by ray (sort_rows_by_ray).
+
+   Hits at the same depth stay in the order of the rows: by index, for hits cut at t_near and for copies.
+   Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_ROWS16_H
 #define GBT_TRACE_LIST_ROWS16_H
 
@@ -15,13 +20,14 @@
 #include "trace/ray_hits.h"
 #include "trace/row16.h"
 
-/* The passes over a packet: each has the registers to itself. */
+/* Passes over a packet are not inlined: each has all registers to itself. */
 #define PASS __attribute__((noinline))
 
-/* Steps back, or on, that a packet is allowed per row before its rays are sorted one by one. */
+/* Steps that a packet may take, back in the forward pass and on in the adjoint: STEPS_PER_ROW for each row
+   and STEPS_FREE in addition. With more, its rays are sorted one by one. */
 enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };
 
-/* A row's place, and how many rows it goes back past. */
+/* The place of a row, and how many rows it steps back past. */
 typedef struct row_back {
     uint32_t place, past;
 } row_back;
@@ -31,15 +37,15 @@ typedef struct packet_hits {
     float *t;     /* depth, hit or not */
     float *alpha; /* 0 where the ray has no hit in this row */
     /* By place in the order: */
-    float *T_front; /* T in front of the hit, from 1 on; two more stand before the first */
-    float *before;  /* product of 1 - alpha over all rows before this one; two more, too */
-    float *reached; /* not adjoint: farthest hit of all rows before this one; two more, too */
-    /* Adjoint: T alpha g . color, and the sum of that behind, of which two more stand after the last; of a
-       row, 1 / den of its response. */
+    float *T_front; /* T in front of the hit, starting from 1; two spare rows stand before the first */
+    float *before;  /* product of 1 - alpha over all rows before this one; two spare rows, too */
+    float *reached; /* forward only: farthest hit of all rows before this one; two spare rows, too */
+    /* Adjoint only. By place: T alpha g . color, and the sum of it over the hits behind, with two spare rows
+       after the last. By row: 1 / den of its response. */
     float *term, *behind, *inverse;
-    uint32_t *kept; /* by place: entries of the tape in front of it; adjoint: the last place that it goes on
-                       past */
-    row_back *back; /* not adjoint: of rows that go back past more than two, in their order */
+    uint32_t *kept; /* by place. Forward: how many entries the tape has in front of it; adjoint: the last
+                       place that it passes when it goes on */
+    row_back *back; /* forward only: the rows that step back past more than two, in their order */
     size_t back_count;
     uint32_t *order;  /* row */
     uint32_t *number; /* of a row, in the tile's list */
@@ -52,7 +58,7 @@ typedef struct packet_hits {
 
 static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoint, packet_hits *out)
 {
-    /* Arrays 4096 bytes apart would compete for the same lines of the cache. */
+    /* An odd number of rows: arrays 4096 bytes apart would compete for the same cache sets. */
     const size_t n = ((most + 48 + 63) & ~(size_t)63) + 7, wide = n * PACKET_LANES, arrays = adjoint ? 7 : 5;
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, arrays * wide + 6 * (n + 9),
                     sizeof(float), "rows of a packet", NULL) != GBT_OK)
@@ -74,7 +80,7 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     out->kept = word + 2 * n;
     out->back = (row_back *)(void *)(word + 3 * n);
     out->back_count = 0;
-    out->steps = 0; /* so they stay in one order for all rays */
+    out->steps = 0; /* also what they are with packet_order, where nothing is inserted */
     out->crowded = false;
     return true;
 }
@@ -84,11 +90,11 @@ typedef struct row_response {
     vfloat16 inverse; /* 1 / den */
 } row_response;
 
-/* Rows whose chains of operations run beside each other: a processor does not look far enough ahead to find
-   the next row by itself. */
+/* Rows that are evaluated side by side, so that their dependency chains overlap: a processor does not look
+   far enough ahead to find the next row by itself. */
 enum { TOGETHER = 4 };
 
-/* `v`: NULL, or what sum_rows() finds of each row. */
+/* Responses by view_form16.h. `v`: NULL, or receives the v of sum_rows(). */
 static inline __attribute__((always_inline)) void respond_together(const tile_gaussian *const g[TOGETHER],
                                                                    vfloat16 a, vfloat16 b, vfloat16 length,
                                                                    row_response out[TOGETHER],
@@ -124,7 +130,7 @@ static inline __attribute__((always_inline)) void respond_together(const tile_ga
         out[k].raw = vfloat16_mul(vfloat16_set1(g[k]->opacity), vfloat16_exp2(exponent[k]));
 }
 
-/* By the general form of gaussian16.h. */
+/* The response by the general form of gaussian16.h. */
 static row_response respond_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id)
 {
     const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
@@ -134,7 +140,7 @@ static row_response respond_general(const kernel_scene *scene, const packet_rays
     return (row_response){r.t, response_alpha(&g, r.d2), vfloat16_set1(0)};
 }
 
-/* respond_together(), by the general form where the other does not hold. */
+/* respond_together(), replaced by the general form for rows that the other does not hold for. */
 static inline __attribute__((always_inline)) void respond_rows(
     const kernel_scene *scene, const packet_rays *rays, const tile_gaussian *const g[TOGETHER], vfloat16 a,
     vfloat16 b, vfloat16 length, row_response r[TOGETHER], vfloat16 v[TOGETHER][3])
@@ -154,7 +160,7 @@ static inline const tile_gaussian *gaussian_at(const tile_list *list, const pack
     return &list->gaussian[rows->number[rows->order[place]]];
 }
 
-/* `count` rows from place `first` on, by index. Sorted in arrays that are not yet set. */
+/* Sorts `count` rows from place `first` on by index, in arrays that are not yet set. */
 static void order_by_index(const tile_list *list, packet_hits *rows, size_t first, size_t count)
 {
     uint32_t *sorted = (uint32_t *)(void *)(rows->T_front + count);
@@ -195,9 +201,9 @@ static void order_copies(const kernel_scene *scene, const tile_list *list, packe
 
 enum { MIDDLE = PACKET_PIXELS + 1 };
 
-/* The depth of a row for one order of all rays (trace_settings.packet_order). A plane seen from its edge may
-   be anywhere on a ray beside it, also behind its start: where the middle ray has no hit, the next one that
-   has says about how far it is. */
+/* The depth of a row by which it is sorted with packet_order: that on the middle ray, kept between half and
+   twice that on the next ray that is hit. For a plane seen from its edge may be anywhere on a ray that misses
+   it, also behind the start of the ray. */
 static inline float packet_depth(const packet_hits *rows, size_t i, float t_near)
 {
     const float *t = rows->t + i * PACKET_LANES;
@@ -207,9 +213,10 @@ static inline float packet_depth(const packet_hits *rows, size_t i, float t_near
     return larger(larger(0.5f * near_by, t_near), smaller(t[MIDDLE], 2 * near_by)); /* NaN: twice */
 }
 
-/* The rows in the order of their depth on a ray in the middle; those of the same depth, in that of the tile's
-   list. Where two floats happen to be equal on one ray, this order decides: it knows more than they do.
-   A depth may be negative where there is no hit; keys are not, so that rows that are cut come first. */
+/* Sorts the rows by their depth on a ray in the middle; rows of the same depth stay in the order of the
+   tile's list. This order also decides where the floats of two depths happen to be equal on one ray, because
+   it comes from other rays, too. A depth may be negative where there is no hit; keys are not, so that rows
+   that are cut, whose keys are 0, come first. */
 static void order_by_middle(const kernel_scene *scene, const tile_list *list, packet_hits *rows)
 {
     const size_t count = rows->count;
@@ -223,11 +230,11 @@ static void order_by_middle(const kernel_scene *scene, const tile_list *list, pa
         const vmask16 hit = vfloat16_lt(vfloat16_set1(0), row_load(rows->alpha, (int)i)),
                       near = vfloat16_le(row_load(rows->t, (int)i), vfloat16_set1(scene->settings.t_near));
         const bool first = vmask16_any(vmask16_and(near, hit));
-        if (first || rows->key[i] == FLT_MAX) /* no hit there */
+        if (first || rows->key[i] == FLT_MAX) /* FLT_MAX: the middle ray has no depth */
             rows->key[i] = 0;
         cut = cut || rows->key[i] == 0;
     }
-    const uint64_t *order = /* in the place of arrays that are not yet set */
+    const uint64_t *order = /* sorted in arrays that are not yet set */
         sort_depths(rows->key, count, (uint64_t *)(void *)rows->reached, (uint64_t *)(void *)rows->before);
     for (size_t i = 0; i < count; i++)
         rows->order[i] = (uint32_t)order[i];
@@ -245,8 +252,8 @@ typedef struct near_row {
     vfloat16 t, alpha, term, value; /* term: adjoint */
 } near_row;
 
-/* Row i goes back past `other`: where it lies in front, the other's T is less by its alpha; elsewhere its own
-   is. */
+/* The new row steps back past `other`: on rays where it lies in front, T of the other is multiplied by its 1
+   - alpha; elsewhere `product` is multiplied by that of the other. */
 static inline void pass_row(const near_row *now, near_row *other, vfloat16 *product)
 {
     const vmask16 front = vfloat16_lt(now->t, other->t);
@@ -254,7 +261,8 @@ static inline void pass_row(const near_row *now, near_row *other, vfloat16 *prod
     *product = vfloat16_less_unless(front, *product, other->alpha);
 }
 
-/* Row i goes back past those before j, too; returned is its T. */
+/* The new row steps back past rows before place j while it has to. Returns its T but for the rows from j
+   on. */
 static inline __attribute__((always_inline)) vfloat16 step_back(const packet_hits *rows, const near_row *now,
                                                                 vmask16 hit, int j, size_t *steps)
 {
@@ -271,7 +279,7 @@ static inline __attribute__((always_inline)) vfloat16 step_back(const packet_hit
     return vfloat16_mul(row_load(rows->before, j), product);
 }
 
-/* The end of the rows so far, for the next one. */
+/* The state after the rows so far, from which the next one is inserted. */
 typedef struct insertion {
     near_row last, second;
     vfloat16 before;  /* product of 1 - alpha over all of them */
@@ -289,9 +297,9 @@ static inline insertion start_insertion(const packet_hits *rows)
     return (insertion){none, none, one, zero, 0, 0, false};
 }
 
-/* Row i of the order: T in front of its hits, and in front of those that they hide. Each goes back past the
-   last two without asking, because a branch that cannot be foretold costs more. `rows` is a copy of `out`,
-   so that compilers know what stores cannot change. */
+/* Inserts row i of the order: finds T in front of its hits, and corrects T in front of those that they hide.
+   Every row passes the last two without asking, because a mispredicted branch costs more. `rows` is a copy of
+   `out`, so that the compiler knows what stores cannot change. */
 static inline void insert_row(const packet_hits *rows, insertion *s, int i, vfloat16 t, vfloat16 alpha)
 {
     const vfloat16 zero = vfloat16_set1(0);
@@ -340,7 +348,8 @@ static PASS void insert_rows(packet_hits *out)
     end_insertion(out, &s);
 }
 
-/* The hits of one ray in their order, in scratch, each with its place; NULL when memory ran out. */
+/* The hits of one ray in their order, in scratch; the lower half of a key is the place of the row. NULL when
+   memory ran out. */
 static const ray_hit *sort_lane(const packet_hits *rows, int lane, list_scratch *scratch, size_t *count)
 {
     if (mem_reserve(&scratch->hits, &scratch->hit_bytes, 0, 2 * rows->count * sizeof(ray_hit), 1,

@@ -38,8 +38,8 @@ typedef struct list_part {
     uint32_t tile;
     uint8_t face;
     bool whole; /* all of the tile's rays */
-    bool first; /* of the tile: pixels without a ray are its */
-    bool sees;  /* of some ray a part of its way is left (ray_image.near); else no Gaussian is listed */
+    bool first; /* the first part of the tile: pixels without a ray belong to it */
+    bool sees;  /* some ray has a part to be traced (ray_image.near); else no Gaussian is listed */
 } list_part;
 
 /* Sixteen slope_box: lowest a, highest a, lowest b, highest b. */
@@ -67,14 +67,14 @@ enum { RECORD_GENERAL = 1u << 31 }; /* the form does not hold for it: see list_e
 static inline uint32_t record_id(const list_record *r) { return r->id & ~(uint32_t)RECORD_GENERAL; }
 static inline bool record_is_general(const list_record *r) { return (r->id & RECORD_GENERAL) != 0; }
 
-/* Where it can be hit. Seen from its mean, the outline is the ellipse (c0 x + c1 y)^2 + (c2 y)^2 <= 1 about
-   (x, y); a little larger than it is, for rounding. */
+/* Where a record can be hit: the ellipse (c0 x + c1 y)^2 + (c2 y)^2 <= 1 of slopes about a centre that is (x,
+   y) from the mean; slightly enlarged for rounding. */
 typedef struct list_outline {
     float x, y, chol[3], half[2]; /* half: extents of the ellipse */
     float kappa;                  /* t >= |(a, b, 1)| depth (1 - kappa) / w1 */
 } list_outline;
 
-/* In place of the outline of a Gaussian that the form does not hold for, because it would, if it were
+/* Replaces the outline of a Gaussian that view_form16.h does not hold for, because it would, if it were
    opaque, reach behind the near depth or be as large as it is far: centre and covariance of its ellipsoid in
    the face's axes. */
 typedef struct list_ellipsoid {
@@ -95,15 +95,15 @@ typedef struct list_pair {
 } list_pair;
 
 /* What the tiles add to the gradients of a Gaussian: sums over hits of h = dL/d(d2), h v, h v v^T (xx yy zz
-   yz zx xy), dL/d(colour), T alpha. v is in the turned axes of view_form16.h, of a general record in the
-   Gaussian's own. */
+   yz zx xy), dL/d(colour), T alpha. v is in the turned axes of view_form16.h, and lacks R and the sign of the
+   first component (turn_sums); for a general record it is in the Gaussian's own axes. */
 enum { SLOT_H, SLOT_HV, SLOT_HVV = SLOT_HV + 3, SLOT_COLOR = SLOT_HVV + 6, SLOT_WEIGHT = SLOT_COLOR + 3 };
 typedef struct gradient_slot {
     _Alignas(64) float sum[16];
 } gradient_slot;
 
-/* Sums of gradient_record, of the Gaussians or records of a block. Arrays that lie 2,048 bytes apart would
-   compete for the same lines of the cache. */
+/* The sums of a gradient_record for the Gaussians or records of a block. Sixteen more than needed: arrays
+   that lie 2,048 bytes apart would compete for the same cache sets. */
 typedef struct block_sums {
     _Alignas(64) float sum[GRADIENT_FLOATS][LIST_GRAIN + 16];
 } block_sums;
@@ -123,8 +123,9 @@ typedef struct list_view {
     box_lanes *boxes16;    /* the same of sixteen parts each, face by face */
     box_lanes *boxes256;   /* and sixteen boxes around sixteen parts each */
     size_t block_count;    /* of Gaussians */
-    uint16_t *reached;     /* six faces: which of sixteen Gaussians may reach into one, [face][block] */
-    list_kept *kept;       /* [face][block] */
+    uint16_t *reached; /* [face][block][LIST_GRAIN / 16] bit per Gaussian that may reach into the face; six
+                          faces only */
+    list_kept *kept;   /* [face][block] */
     list_record *records;
     list_shape *shapes;   /* as many, and one more: shapes are read two at a time */
     uint32_t *slot_first; /* [records] */
@@ -141,7 +142,7 @@ static inline const list_frame *part_frame(const list_view *view, size_t part)
     return &view->face[view->parts[part].face].frame;
 }
 
-/* x . axis of the first face's three. */
+/* Components of a direction along the three axes of the first face. */
 static inline void face_components(const list_frame *frame, const float d[3], float out[3])
 {
     for (int k = 0; k < 3; k++)
@@ -168,10 +169,11 @@ static inline bool part_has_ray(const list_view *view, const list_part *part, co
     return face_of(component) == part->face;
 }
 
-/* May a ray of these slopes meet the ellipsoid? By its tangent planes. */
+/* May a ray with slopes in the box meet the ellipsoid? Tests its reach across the planes of the box's four
+   edges, and across w = 0. */
 static inline bool ellipsoid_meets_box(const list_ellipsoid *e, const slope_box *box)
 {
-    /* 64 roundings of the largest coordinates; few are made. */
+    /* 64 ulps of the largest coordinates, more than rounding loses. */
     const float slack = 4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2]));
     const float behind = -e->center[2] - slack;
     if (behind > 0 && behind * behind > e->ww)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/packet_extra16.h -- what the rays of a packet show beside their colour. Included by kernels. */
+/* trace/packet_extra16.h -- the outputs of a packet's rays other than colour: depth, normal, counts. Included
+   by kernels. */
 #ifndef GBT_TRACE_PACKET_EXTRA16_H
 #define GBT_TRACE_PACKET_EXTRA16_H
 

@@ -20,10 +20,11 @@
 
 enum { ROW_GRAIN = 8 };
 
-/* Directions of about so many rays are kept of several lenses, 24 bytes each; of one lens, always. */
+/* Directions of several lenses are kept as long as they are no more than about this many rays, 24 bytes each;
+   those of one lens are always kept. */
 static const size_t kept_rays = (size_t)1 << 23;
 
-/* Part of the aperture, in shares of its area and of a turn. */
+/* A cell of the aperture: a range of its area, from the middle out, and of a turn, as shares of 1. */
 typedef struct aperture_cell {
     double area_low, area_span, turn_low, turn_span;
 } aperture_cell;
@@ -36,7 +37,7 @@ typedef struct ray_job {
     const double *column_u;     /* [width] (x + 0.5 - cx) / fx; pinhole and orthographic only */
     double *lens_dir;           /* ray_lens.dir; other lenses only */
     const camera_pose *poses;   /* [1], or one for each row or column */
-    gbt_camera_shutter shutter; /* which; GBT_CAMERA_SHUTTER_GLOBAL also for a camera that does not move */
+    gbt_camera_shutter shutter; /* GBT_CAMERA_SHUTTER_GLOBAL also for a camera that does not move */
     aperture_cell cell;
     float *origin; /* NULL: one for all */
     float *dir;
@@ -102,8 +103,8 @@ static void span_disc(const double d[3], double across[3], double along[3])
     dvec_cross(d, across, along);
 }
 
-/* Move a ray of camera axes to its place on the aperture; the point it has in focus stays. `dir` need not be
-   a unit vector before. */
+/* Moves the start of a ray (camera axes) to a point on the aperture and turns it so that it still meets its
+   point in focus. `dir` need not be a unit vector on entry. */
 static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], double dir[3])
 {
     uint32_t words[4];
@@ -126,7 +127,7 @@ static void open_aperture(const ray_job *job, uint64_t pixel, double start[3], d
     dvec_normalize(dir);
 }
 
-/* One ray at a time: what has an aperture, or a pose for each column. */
+/* One ray at a time: for an aperture, or a pose for each column. */
 static void any_row(const ray_job *job, int row, float *origin, float *dir)
 {
     const ray_shot *shot = job->shot;
@@ -220,7 +221,7 @@ static bool pose_is_finite(const gbt_camera *camera)
     return true;
 }
 
-/* Farthest from 0 that a ray may start; not finite when anything is not. */
+/* An upper bound of the distance of the rays' origins from 0; not finite when any input is not. */
 static double origin_bound(const ray_shot *shot, const camera_lens *lens)
 {
     double corner[3], far = 0;
@@ -270,7 +271,7 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err)
     return shot->given != NULL ? GBT_OK : check_shot(shot, &lens, err);
 }
 
-/* All arrays but those of the lenses. */
+/* Frees all arrays but those of the lenses. */
 static void free_rays(ray_image *rays)
 {
     float **const all[] = {&rays->origin, &rays->dir, &rays->far, &rays->near, &rays->T_front};
@@ -310,7 +311,7 @@ static void free_lens(ray_lens *lens)
     lens->dir = NULL;
 }
 
-/* Directions in camera axes, unless they are there from a pose before. */
+/* Directions in camera axes, unless they have been kept from an earlier pose of the same lens. */
 static gbt_status unproject_lens(ray_job *job, ray_image *rays, gbt_error *err)
 {
     const gbt_camera *camera = &job->shot->camera;
@@ -347,9 +348,9 @@ static double *make_columns(const ray_job *job, gbt_error *err)
     return u;
 }
 
-/* The disc as m rings around each other, cut into `count` cells of the same area, about as long as wide (m^2
-   pi = count): ring j ends with cell count ((j + 1) / m)^2. All pixels take a sample in the same cell, so
-   that neighbouring rays stay close. */
+/* Cuts the disc into m concentric rings, and these into `count` cells of the same area that are about as long
+   as wide (m^2 pi = count): ring j ends with cell count ((j + 1) / m)^2. All pixels take a sample in the same
+   cell, so that neighbouring rays stay close. */
 static aperture_cell find_cell(int sample, int count)
 {
     const int rings = (int)fmax(1, floor(sqrt(count / PI) + 0.5));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/rays.h -- the rays of one view: of a camera standing still, moving while it is read out, with an open
-   aperture; or given. */
+/* trace/rays.h -- the rays of one view: of a camera that stands still, or moves while it is read out, or has
+   an open aperture; or given rays. */
 #ifndef GBT_TRACE_RAYS_H
 #define GBT_TRACE_RAYS_H
 
@@ -16,7 +16,7 @@
 /** Coordinates of a ray's origin are below it: squares of them have to stay finite in float. */
 #define RAY_ORIGIN_LIMIT 1e17
 
-enum { RAY_LENSES = 64 /* a photo trained on every eighth pixel of a row and a column is as many lenses */ };
+enum { RAY_LENSES = 64 /* a photo trained on every eighth pixel of rows and columns is 64 lenses */ };
 
 /** What a lens makes of the pixel centres: directions in camera axes, [height * width][3]; owned. */
 typedef struct ray_lens {
@@ -24,8 +24,8 @@ typedef struct ray_lens {
     double *dir; /* NULL: none yet */
 } ray_lens;
 
-/** Row-major. A ray with a zero direction is invalid, to the tracer also one that is not ray_is_sound(): it
-    sees the background, and its transmittance is 1. */
+/** Row-major. A ray with a zero direction is invalid, and for the tracer also one that is not ray_is_sound():
+    it sees the background, and its transmittance is 1. */
 typedef struct ray_image {
     int width, height;
     float *origin; /* [3] when shared by all rays (common_origin), else [height * width][3]; scene-local
@@ -112,11 +112,11 @@ static inline const float *ray_image_origin(const ray_image *rays, size_t i)
     return rays->common_origin ? rays->origin : rays->origin + 3 * i;
 }
 
-/** Of the squared length of a direction, or of several in a vector: is it a unit vector? Rounding alone is
-   far within the limits. */
+/** Whether `square`, or each element of a vector, is the squared length of a unit vector. What rounding alone
+    changes is far within the limits. */
 #define RAY_SQUARE_IS_SOUND(square) (((square) > 0.99f) & ((square) < 1.01f))
 
-/** False for NaN, as the next. */
+/** False for NaN, as is ray_origin_is_sound(). */
 static inline bool ray_direction_is_sound(const float d[3])
 {
     const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
@@ -129,7 +129,7 @@ static inline bool ray_origin_is_sound(const float o[3])
     return fabsf(o[0]) < limit && fabsf(o[1]) < limit && fabsf(o[2]) < limit;
 }
 
-/** Does the ray count? Others see the background. */
+/** Whether the ray is traced. Others see the background. */
 static inline bool ray_is_sound(const float o[3], const float d[3])
 {
     return ray_direction_is_sound(d) && ray_origin_is_sound(o);

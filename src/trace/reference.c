@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/reference.c -- what one ray sees, in double and without any cleverness. The equations are in the
+/* trace/reference.c -- what one ray sees, in double and as simply as possible. The equations are in the
    header. */
 #include "trace/reference.h"
 
@@ -87,13 +87,13 @@ typedef struct hit_list {
     size_t count, capacity;
 } hit_list;
 
-/* One ray and what it sees of. */
+/* A ray, the limits within which it sees, and what the order of its hits depends on. */
 typedef struct sight {
     double origin[3], dir[3], near, far;
     double T_front; /* ray_image.T_front */
     bool own_order; /* hits are sorted by their depth; else by packet_depth() of these, from one origin: */
     const ray_image *rays;
-    size_t middle, packet[PACKET], packet_count; /* packet: from the middle one on, those that are rays */
+    size_t middle, packet[PACKET], packet_count; /* packet: its valid rays, from lane MIDDLE on */
 } sight;
 
 static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
@@ -114,7 +114,8 @@ static double near_of(const ray_image *rays, size_t i)
     return rays->near == NULL ? 0 : (double)rays->near[i];
 }
 
-/* Where a Gaussian that one of a packet's rays hits stands in the one order of all of them. */
+/* The key of a Gaussian in the one order of a packet's rays (packet_order); 0 if one of them hits it at
+   t_near. */
 static double packet_depth(const prepared *p, const trace_settings *s, const sight *ray)
 {
     double origin[3], dir[3], v[3], near_by = 0;
@@ -192,8 +193,8 @@ static gbt_status prepare_all(const reference_scene *scene, const trace_settings
     return GBT_OK;
 }
 
-/* Ray i; with packet_order, those of its 4 x 4 pixels, too: the middle one is in their second row and column,
-   or, where that is none, the first of them that is one. */
+/* Sets up ray i and, with packet_order, the rays of its 4 x 4 pixels. The middle one is in their second row
+   and column or, if that is not a valid ray, the first that is. */
 static void see(const trace_settings *s, const ray_image *rays, size_t i, sight *out)
 {
     const size_t width = (size_t)rays->width, x0 = i % width / SIDE * SIDE, y0 = i / width / SIDE * SIDE;

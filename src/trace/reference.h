@@ -42,8 +42,8 @@ gbt_status reference_scene_make(const gaussians *g, reference_scene *out, gbt_er
 void reference_scene_free(reference_scene *scene); /* zeroes the struct */
 
 /**
- * All hits of one ray with alpha >= alpha_min, sorted by (t, id). A ray alone has no packet, and packet_order
- * is not heeded.
+ * All hits of one ray with alpha >= alpha_min, sorted by (t, id). A ray alone has no packet: packet_order is
+ * ignored.
  *
  * @param hits, capacity [in,out] array that grows by mem_reserve(); start from NULL and 0, free with
  *              mem_free()

@@ -10,7 +10,7 @@
 
 static const double alpha_band = 1e-6, transmittance_band = 1e-5, depth_band = 2e-6;
 
-/* `hits` go a little below alpha_min. */
+/* `hits` include some that are a little below alpha_min. */
 static bool is_in_band(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
                        size_t count)
 {

@@ -17,7 +17,7 @@ typedef struct band_scratch {
 /**
  * May rounding change which hits a ray blends, or their order?
  *
- * So it is when an alpha is within 1e-6 of alpha_min or alpha_max, a transmittance within 1e-5 of T_min
+ * It may when an alpha is within 1e-6 of alpha_min or alpha_max, a transmittance within 1e-5 of T_min
  * (relative), or two neighbours' depths within 2e-6 (relative).
  *
  * @param origin, dir [in] as traced: rounded to float

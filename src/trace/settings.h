@@ -15,13 +15,13 @@ typedef struct trace_settings {
     float transmittance_min; /* stop before the hit that would bring T below this. Default 1e-4 */
     float t_near;            /* nearest depth of a response, scene-local units, >= 0. Default 0.01 */
     float background[3];     /* blended last, with the remaining T. Default 0 */
-    sky sky;                 /* what is added to it by the ray's direction. Default nothing */
-    bool packet_order; /* blend the hits of 4 x 4 neighbouring rays in one order, and not each ray's own in
-                          its own order: first the Gaussians that one of them hits at t_near, by index; then
-                          by their depth on a ray in the middle, which counts as at least half and at most
-                          twice that on the next ray that is hit; hits behind those that have made a ray
-                          opaque may be left out. An approximation for training, docs/tracing.md; only rays
-                          that go over lists heed it. Default false */
+    sky sky;                 /* added to it as a function of the ray's direction. Default nothing */
+    bool packet_order; /* an approximation for training (docs/tracing.md): the hits of 4 x 4 neighbouring rays
+                          are blended in one order, and not in each ray's own. First the Gaussians that one of
+                          these rays hits at t_near, by index; then the others by their depth on a ray in the
+                          middle, kept between half and twice that on the next ray that is hit. Hits behind
+                          those that have made a ray opaque may be left out. Only rays that go over lists heed
+                          it. Default false */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

@@ -26,7 +26,8 @@ static bool packet_pixel(const ray_image *rays, int x0, int y0, int packet, size
     return x + PACKET_PIXELS <= rays->width && y + PACKET_PIXELS <= rays->height;
 }
 
-/* A ray of the packet; it is not active when it is outside the image or none. */
+/* Loads a ray into its lane, which stays inactive if the ray is not valid or no part of it is to be
+   traced. */
 static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
 {
     const float *d = rays->dir + 3 * at, *o = ray_image_origin(rays, at);
@@ -46,7 +47,7 @@ static void load_ray(const ray_image *rays, size_t at, int lane, packet_rays *p)
     p->active |= 1u << lane;
 }
 
-/* The common case: pixels in the image, rays from one point, nothing in their way. */
+/* The common case: all pixels in the image, rays from one point, no limits to their length. */
 static void load_whole_packet(const ray_image *rays, size_t first, packet_rays *p)
 {
     const float *o = rays->origin;
@@ -88,7 +89,7 @@ static void repeat_active(packet_rays *p, bool parts)
     }
 }
 
-/* Leave to a part of a tile what is its own. */
+/* Leaves active only the rays that belong to this part of the tile; `elsewhere`: the other pixels. */
 static void keep_part(const list_view *view, const list_part *part, packet_rays *p, uint16_t *elsewhere)
 {
     unsigned own = part->first ? ~p->active : 0;
@@ -127,7 +128,7 @@ void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int 
     }
 }
 
-/* A pixel without a ray: as a sky in no direction, cut as that is. */
+/* The background of a pixel without a ray: the one colour, cut to [0, 1] where there is a sky. */
 static float plain_background(const trace_settings *s, size_t c)
 {
     const float color = s->background[c];

@@ -13,8 +13,8 @@
 void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int y0, const list_view *view,
                     const list_part *part, tile_rays *out);
 
-/** What was traced, into the pictures that `to` asks for. A pixel without a ray becomes the background; those
-    of another part stay. */
+/** Writes what was traced into the pictures that `to` asks for. A pixel without a ray becomes the background;
+    pixels that belong to another part of the tile are not written. */
 void tile_store_pixels(const ray_image *rays, const kernel_scene *scene, const trace_outputs *to, int x0,
                        int y0, const tile_rays *tile, const packet_output out[TILE_PACKETS]);
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/trace.c -- tiles over an image, forward and back.
 
-   image --> tiles of 16 x 16 pixels (one task each) --> packets of 4 x 4 --> kernel --> pixels, tape
-   d_image + tape --> kernel --> one record per tile and Gaussian --> gradients.c */
+     rays --> lists of the tiles, if they can be made (list_build.c); else the tree (bvh/gaussian_tree.h)
+     image --> tiles of 16 x 16 pixels (one task each) --> packets of 4 x 4 --> kernel --> pixels, tape
+     d_image + tape --> kernel --> one record per tile and Gaussian --> gradients.c */
 #include "trace/trace.h"
 
 #include <math.h>
@@ -91,7 +92,7 @@ static kernel_scene scene_for_kernel(const trace_scene *scene)
                           .settings = scene->settings};
 }
 
-/* ---- memory of the tiles in flight, from tile to tile ---- */
+/* ---- memory of the tiles in flight, passed from tile to tile ---- */
 
 typedef struct tile_scratch {
     tree_scratch tree;
@@ -141,7 +142,7 @@ typedef struct pass {
     kernel_scene inputs;
     const tree_kernel *tree;
     tree_forward_fn *forward;
-    const list_kernel *list; /* NULL: by `forward` and the tree */
+    const list_kernel *list; /* NULL: the tree is walked by `forward` */
     const ray_image *rays;
     int tiles_across;
     bool keep_tape;
@@ -280,7 +281,7 @@ static gbt_status run_pass(pass *p, gbt_error *err)
     return GBT_OK;
 }
 
-/* Lists of the tiles for TRACE_LIST when they can be made, else the tree. */
+/* For TRACE_LIST, makes lists of the tiles, or the tree where there can be no lists. */
 static gbt_status prepare_view(trace_scene *scene, const ray_image *rays, gbt_error *err)
 {
     scene->listed = false;

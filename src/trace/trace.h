@@ -20,15 +20,15 @@
 #include "trace/rays.h"
 #include "trace/settings.h"
 
-/** Which way rays go. All give the same picture to float rounding, but of copies of one Gaussian that differ
-    in opacity TRACE_TREE may put the more opaque one first, whatever its index; the adjoint is the same for
-    all. */
+/** How rays find the Gaussians that they hit. All give the same picture to float rounding, except that
+    TRACE_TREE may put the more opaque of two copies of one Gaussian first, whatever its index. The adjoint is
+    the same for all. */
 typedef enum trace_kernel {
     TRACE_LIST,   /* the default: 16 x 16 pixels over a list of what they may see, where all rays start at one
                      point and not too many Gaussians are near it; else as TRACE_TREE */
-    TRACE_TREE,   /* 16 x 16 pixels share one way through the tree */
-    TRACE_SINGLE, /* ray by ray: for rays that do not run together */
-    TRACE_EMBREE  /* packets of 16 under Embree's own traversal: the baseline of every benchmark */
+    TRACE_TREE,   /* 16 x 16 pixels share one traversal of the tree */
+    TRACE_SINGLE, /* ray by ray: for incoherent rays */
+    TRACE_EMBREE  /* packets of 16 in Embree's own traversal: the baseline of every benchmark */
 } trace_kernel;
 
 /** One view's Gaussians, ready to be traced; and the memory of passes over them, reused from view to view.
@@ -100,7 +100,8 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
                          kernel_counters *counters, gbt_error *err);
 
 /**
- * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Once: the tape is given back.
+ * Adjoint of the last trace_forward(keep_tape) on `scene`, with the same rays. Can be called once: it
+ * releases the tape.
  *
  * @param d_rgb       [in]  dL/d(rgb), size of `rays`
  * @param d_gaussians [out] resized like the source and overwritten: dL/dfield (scales linear, quaternion

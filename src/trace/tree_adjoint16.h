@@ -1,7 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/tree_adjoint16.h -- the adjoint of a tile: evaluate what was blended again, follow T to the back and
-   the colour to the front, and add every Gaussian's sums to its record. Included by tree_kernel.inc.h.
-   docs/tracing.md has the formulas. */
+/* trace/tree_adjoint16.h -- the adjoint of a tile that went through the tree (docs/tracing.md, "The
+   adjoint").
+
+     tape --> entries of each packet --> [replay_rows] rows evaluated again --> [sort_rows] by nearest depth
+         --> [weigh_rows] T alpha of every hit, by windows of overlapping rows (tree_rows16.h)
+         --> [sum_terms, sum_rays] what lies behind every hit, dL/dalpha, sums over the sixteen rays
+         --> [add_rows] turned into the Gaussian's own axes and added to its record
+
+   Packets that were traced ray by ray go back ray by ray (ray_adjoint). Included by tree_kernel.inc.h. */
 #ifndef GBT_TRACE_TREE_ADJOINT16_H
 #define GBT_TRACE_TREE_ADJOINT16_H
 
@@ -11,16 +17,16 @@
 #include "trace/tree_rows16.h"
 #include "trace/tree_view16.h"
 
-/* What one hit, or the sixteen of a row, add to a Gaussian's record. */
+/* The terms that one hit, or the sixteen of a row, add to the record of a Gaussian. */
 static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weight, const vfloat16 v_in[3],
                                   vfloat16 opacity, vfloat16 alpha_max, const vfloat16 d_rgb[3],
                                   vfloat16 terms[16])
 {
-    /* alpha = min(alpha_max, opacity G): from the cap on nothing but the colour has a gradient. */
+    /* Where alpha = min(alpha_max, opacity G) is capped, only the colour has a gradient. */
     const vfloat16 zero = vfloat16_set1(0),
                    d_raw = vfloat16_select(vfloat16_lt(raw, alpha_max), d_alpha, zero);
     const vmask16 blended = vfloat16_lt(zero, weight);
-    vfloat16 v[3]; /* on rays that did not hit, v may be more than a float holds, and 0 times that is no 0 */
+    vfloat16 v[3]; /* on rays that did not hit, v may be infinite or NaN, and 0 times that is not 0 */
     for (int k = 0; k < 3; k++)
         v[k] = vfloat16_select(blended, v_in[k], zero);
     const vfloat16 h = vfloat16_mul(vfloat16_set1(-0.5f), vfloat16_mul(raw, d_raw)); /* dL/d(d2) */
@@ -38,7 +44,7 @@ static inline void gradient_terms(vfloat16 d_alpha, vfloat16 raw, vfloat16 weigh
     terms[14] = terms[15] = zero;
 }
 
-/* terms[k] lane i, i < count and 16, is added to sum k of the record of entry i. */
+/* Adds lane i of terms[k] to sum k of the record of entry i, for the first `count` lanes, at most 16. */
 static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[16], gradient_list *out)
 {
     _Static_assert(sizeof(gradient_record) == 16 * sizeof(float), "the id stands behind the sums");
@@ -60,8 +66,8 @@ static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[
     return true;
 }
 
-/* Rows of the adjoint, PACKET_LANES floats each: as evaluated, then in order. Groups: the rows' Gaussians,
-   sixteen by sixteen. */
+/* Rows of the adjoint, PACKET_LANES floats each: first in the order of the tape, then sorted. Groups: the
+   Gaussians of sixteen rows each. */
 enum { FIELD_T, FIELD_CLEAR, FIELD_RAW, FIELD_V, FIELD_COLOR = FIELD_V + 3, FIELD_WEIGHT, FIELD_COUNT };
 
 typedef struct adjoint_group {
@@ -100,7 +106,7 @@ static bool reserve_rows(int count, tree_scratch *scratch, adjoint_rows *out)
     return true;
 }
 
-/* Those of entries first .. first + 15; the last one is repeated behind the end. */
+/* The Gaussians of entries first .. first + 15; the last entry is repeated past the end. */
 static inline gaussian_lanes entry_gaussians(const kernel_scene *scene, const tape_entry *entry, int first,
                                              int count, vfloat16 *color)
 {
@@ -119,7 +125,7 @@ static void view_rows(const kernel_scene *scene, const tile_beam *beam, const ta
         view_axes axes;
         const gaussian_lanes g = entry_gaussians(scene, entry, first, o->sorted.count, NULL);
         const vmask16 sound = view_gaussians_from(&g, beam, &group->view, &axes);
-        /* Beside the camera the slopes of the mean run away. */
+        /* Beside the camera the slopes of the mean grow without limit. */
         const vfloat16 wide = vfloat16_set1(8), a = vfloat16_load(group->view.field[VIEW_A]),
                        b = vfloat16_load(group->view.field[VIEW_B]);
         const vmask16 ahead = vmask16_and(
@@ -159,8 +165,8 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
             v[0] = vfloat16_sub(zero, vfloat16_mul(stretch, r.y));
             v[1] = vfloat16_mul(along, r.w2);
             v[2] = vfloat16_mul(along, r.w3);
-            done = !vmask16_any(vmask16_and(blended, vfloat16_le(t, t_near))); /* cut at the near depth: not
-                                                                                  for this form */
+            done =
+                !vmask16_any(vmask16_and(blended, vfloat16_le(t, t_near))); /* not for hits cut at t_near */
         }
         if (!done) {
             ray_lanes ray;
@@ -185,7 +191,8 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
     row_depths(o->field[FIELD_T], o->sorted.count, o->row_near, o->row_far);
 }
 
-/* By (nearest depth, index); the tape is nearly in that order. */
+/* Insertion sort by (nearest depth, index), as the tape is nearly in that order. Returns T behind all
+   rows. */
 static vfloat16 sort_rows(const tape_entry *entry, adjoint_rows *o)
 {
     sorted_rows *s = &o->sorted;
@@ -230,7 +237,7 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
     return add_turned(entry + first, o->sorted.count - first, turned, out);
 }
 
-/* T alpha of every row, T c.g, and their product, the term. */
+/* For every row: T alpha, T c.g, and the term T alpha c.g. */
 static void weigh_rows(vfloat16 alpha_max, adjoint_rows *o)
 {
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0);
@@ -253,7 +260,7 @@ static void weigh_rows(vfloat16 alpha_max, adjoint_rows *o)
     }
 }
 
-/* The sum of the terms of every row and those after it, with what is `behind` all. */
+/* For every row the sum of its term, those of all rows after it, and `behind`, what lies behind all. */
 static void sum_terms(vfloat16 behind, adjoint_rows *o)
 {
     const int count = o->sorted.count;
@@ -317,8 +324,8 @@ static bool packet_adjoint(const kernel_scene *scene, const packet_rays *rays, c
     return true;
 }
 
-/* The hits of one ray, in order: no windows, and no division. What each hit waits for from the one before is
-   one operation; the rest is done for sixteen. */
+/* The adjoint of one ray, whose hits are in order: it needs no windows and no division. T and the colour
+   behind are recurrences of one operation per hit; the rest is done for sixteen hits at a time. */
 static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int lane,
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
                         gradient_list *out, tree_scratch *scratch)
@@ -383,8 +390,8 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
     return true;
 }
 
-/* How many entries there are, and of each packet alone; `singles`: bit per packet whose rays went one by one.
-   A function of its own, so that the counters are in registers. */
+/* Counts the entries of the tape, in all and of each packet; `singles`: bit per packet that was traced ray by
+   ray. Not inlined, so that the counters stay in registers. */
 static __attribute__((noinline)) size_t count_entries(const tape_entry *entry, size_t of_packet[TILE_PACKETS],
                                                       unsigned *singles)
 {
@@ -426,8 +433,8 @@ static bool backward(const kernel_scene *scene, const tile_rays *tile,
                 return false;
             continue;
         }
-        /* Rows that the packet blended before it was given up are not its own any more. The rays' entries
-           come in order. */
+        /* This packet was given up and traced ray by ray: what it had blended before does not count. The
+           entries of its rays come in order. */
         for (unsigned bits = rays[p].active; bits != 0; bits &= bits - 1) {
             const int lane = __builtin_ctz(bits);
             while (next < end && (next->packet & TAPE_SINGLE) == 0)

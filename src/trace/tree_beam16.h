@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/tree_beam16.h -- the beam of a tile and of its packets: which nodes and which ellipsoids can they
-   touch. Conservative, never exact.
+/* trace/tree_beam16.h -- which nodes and ellipsoids can the rays of a tile, or of a packet, touch?
+   Conservative, never exact.
 
-   Everything is measured in the tile's frame: axis w runs along the middle of the tile, u and v across. A ray
-   is a + s (slope_u, slope_v, 1); a beam is the four planes that hold all of its rays. Included by
-   tree_kernel.inc.h. */
+   A tile has a frame: axis w runs along its middle, u and v across. In it a ray is a + s (slope_u, slope_v,
+   1), and the beam of a tile or packet is the four planes that enclose all of its rays. Boxes of nodes are
+   tested against the planes of the tile; ellipsoids are turned into the frame and tested against those of the
+   tile and of each packet. If all rays start at one point, the slopes of an ellipsoid's tangent planes
+   through it are found once and compared. Included by tree_kernel.inc.h. */
 #ifndef GBT_TRACE_TREE_BEAM16_H
 #define GBT_TRACE_TREE_BEAM16_H
 
@@ -110,7 +112,8 @@ static bool make_frame(const packet_rays *rays, tile_beam *out)
     return true;
 }
 
-/* How far out to a side the origins of a packet lie, `at` in the frame: the largest side (x - slope w). */
+/* The largest side (x - slope w) of the origins of a packet, `at` in the frame: how far out they lie on that
+   side. */
 static inline float farthest_start(const vfloat16 at[3], int side, float slope)
 {
     const vfloat16 x = at[side / 2], along = vfloat16_mul(vfloat16_set1(slope), at[2]);
@@ -122,7 +125,7 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
 {
     if (!make_frame(rays, out))
         return false;
-    /* Every bound is opened by more than rounding could have taken: 8 roundings of the slopes and 16 of the
+    /* Every bound is enlarged by more than rounding can have taken: 8 roundings of the slopes and 16 of the
        largest coordinate. */
     const float slack = 0x1p-20f * scene->coordinate_max;
     float slope[4] = {FLT_MAX, -FLT_MAX, FLT_MAX, -FLT_MAX}; /* of the whole tile */
@@ -207,8 +210,7 @@ static inline unsigned test_children(const tile_beam *b, const tree_node *node, 
     return vmask16_bits(inside);
 }
 
-/* Sixteen ellipsoids in the tile's frame: centre, and covariance of the proxy opened by its rounding
-   errors. */
+/* Sixteen ellipsoids in the tile's frame: centre, and covariance enlarged by its rounding errors. */
 typedef struct ellipsoids16 {
     vfloat16 u, v, w, uu, vv, ww, uw, vw;
 } ellipsoids16;
@@ -229,7 +231,7 @@ static inline void turn_ellipsoids(const tree_leaf *leaf, const tile_beam *b, el
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(b->origin[axis]));
     for (int k = 0; k < 6; k++)
         s[k] = vfloat16_load(leaf->spread[k]);
-    /* About ten roundings, 2^-22 together; test_ellipsoids() sees them times 1 + slope^2, 11 at most
+    /* About ten roundings, 2^-22 together; test_ellipsoids() multiplies them by 1 + slope^2, 11 at most
        (make_beam). */
     const vfloat16 slack =
         vfloat16_mul(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])));
@@ -271,15 +273,16 @@ static inline vfloat16 ellipsoid_nearest(const ellipsoids16 *e, const tile_beam 
         vfloat16_set1(t_near));
 }
 
-/* How far an ellipsoid reaches in slopes as seen from the frame's origin, its tangent planes through there:
-   low and high of u, low and high of v. Returned are the lanes that lie wholly in front of the depth `near`;
-   the slopes are theirs alone. `open`: what coordinates may be off. */
+/* The range of slopes that ellipsoids cover as seen from the frame's origin, from their tangent planes
+   through it: low and high of u, low and high of v. Returns the lanes whose ellipsoids lie wholly in front of
+   the depth `near`; only their slopes are valid. `open`: the error of coordinates. */
 static inline vmask16 ellipsoid_slopes(const ellipsoids16 *e, float near, float open, vfloat16 slope[4])
 {
     const vfloat16 in_front = vfloat16_sub(e->w, vfloat16_set1(near));
     const vmask16 front = vmask16_and(vfloat16_lt(vfloat16_set1(0), in_front),
                                       vfloat16_lt(e->ww, vfloat16_mul(in_front, in_front)));
-    /* (w^2 - ww) s^2 - 2 (x w - xw) s + (x^2 - xx) = 0, its discriminant without large terms that cancel */
+    /* Roots s of (w^2 - ww) s^2 - 2 (x w - xw) s + (x^2 - xx) = 0, with a discriminant without large terms
+       that cancel */
     const vfloat16 inverse = vfloat16_div(vfloat16_set1(1), vfloat16_sub(vfloat16_mul(e->w, e->w), e->ww));
     for (int k = 0; k < 2; k++) {
         const vfloat16 x = k == 0 ? e->u : e->v, xx = k == 0 ? e->uu : e->vv, xw = k == 0 ? e->uw : e->vw;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/tree_kernel.h -- the contract between trace.c and the kernels that walk a tree. Written once
-   (tree_kernel.inc.h) and compiled per instruction set. */
+/* trace/tree_kernel.h -- the interface between trace.c and the kernels that walk a tree, which are written
+   once (tree_kernel.inc.h) and compiled per instruction set. */
 #ifndef GBT_TRACE_TREE_KERNEL_H
 #define GBT_TRACE_TREE_KERNEL_H
 

@@ -26,7 +26,7 @@
 #include "trace/tree_view16.h"
 
 enum {
-    CHUNK_TARGET = 64, /* new candidates before the packets take their part */
+    CHUNK_TARGET = 64, /* new candidates that are gathered before the packets take them */
     CANDIDATE_CAPACITY = 512,
     CHUNK_CAPACITY = 128, /* candidates that the packets take at once */
     HEAP_CAPACITY = 1024
@@ -61,7 +61,7 @@ static inline void append_row(packet_rows *p, uint32_t id, vfloat16 t, vfloat16 
     counters->hits += (uint64_t)__builtin_popcount(bits);
 }
 
-/* Hits at or behind the horizon, on rays that are still alive. */
+/* The hits of a row at or behind the horizon, on rays that are still alive. */
 static inline vmask16 row_remains(const packet_rows *p, int row, float horizon)
 {
     const vfloat16 t = row_load(p->t, row);
@@ -77,8 +77,8 @@ static bool close_row(const packet_rows *p, int row, int packet, hit_tape *tape,
            tape_add(tape, (tape_entry){p->id[row], p->blended[row], (uint16_t)packet});
 }
 
-/* Write the rows that are done to the tape, nearly in order; keep the others. A row of which nothing lies
-   before the horizon is done, too, when an earlier round blended a part of it and the rays of the rest have
+/* Writes the rows that are done to the tape, nearly in order, and keeps the others. A row without hits before
+   the horizon is done, too, if an earlier round blended a part of it and the rays of its other hits have
    become opaque since. */
 static bool close_rows(packet_rows *p, int packet, float horizon, const round_rows *o, hit_tape *tape,
                        kernel_counters *counters)
@@ -177,7 +177,7 @@ typedef struct tile_state {
     _Alignas(64) float nearest[CHUNK_CAPACITY];
     _Alignas(64) float bound[8][CHUNK_CAPACITY]; /* slopes, or centre and spread in the tile's frame */
     uint32_t id[CHUNK_CAPACITY];
-    uint16_t in_front[CHUNK_CAPACITY / 16]; /* bit per candidate: may go through its view */
+    uint16_t in_front[CHUNK_CAPACITY / 16]; /* bit per candidate that view_form16.h may evaluate */
     int count;
     heap_entry heap[HEAP_CAPACITY];
     int heap_count;
@@ -232,8 +232,8 @@ static inline void take_leaf(tile_state *s, const kernel_scene *scene, const tre
     }
 }
 
-/* Move candidates that may lie before the horizon (any, when there is no room to wait) from the waiting to
-   those that are taken, nearest first. */
+/* Moves waiting candidates that may lie before the horizon (all, when the waiting ones take too much room) to
+   those that the packets take next, nearest first. */
 static void pick_candidates(tile_state *s, float horizon)
 {
     int waiting = 0, i = 0, n = 0;
@@ -310,7 +310,7 @@ static bool take_chunk(tile_state *s, const kernel_scene *scene, const tile_rays
         packet_rows *rows = &s->packet[p];
         int first = 0;
         for (; first < s->count; first += 16) {
-            /* No room for sixteen more: blend what the candidates that are left cannot come before. */
+            /* No room for sixteen more: blend the hits that no remaining candidate can come before. */
             if (rows->count > ROW_CAPACITY - 16 &&
                 !blend_rows(rows, p, scene, &rays->packet[p], smaller(horizon, s->nearest[first]), tape,
                             &s->order, counters))
@@ -352,7 +352,7 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
             const uint64_t child = heap_pop(s->heap, &s->heap_count);
             const tree_leaf *leaf = tree_child_leaf(child);
             for (int i = 0; i < 3 && i < s->heap_count; i++)
-                prefetch_child(s->heap[i].child); /* the next is most likely one of these */
+                prefetch_child(s->heap[i].child); /* the next to be popped is most likely one of these */
             counters->nodes++;
             if (leaf == NULL) {
                 const tree_node *node = (const tree_node *)(uintptr_t)child;
@@ -387,7 +387,7 @@ static bool gather_tile(tile_state *s, const kernel_scene *scene, const tile_ray
     return true;
 }
 
-/* The packets that are done in `done`; the others are traced ray by ray. */
+/* Stores the results of the packets in `done`; the other packets are traced ray by ray. */
 static bool finish_tile(const kernel_scene *scene, const tile_rays *rays, const tile_state *s, unsigned done,
                         packet_output out[TILE_PACKETS], hit_tape *tape, tree_scratch *scratch,
                         kernel_counters *counters)

@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/tree_ray16.h -- one ray through the tree, sixteen Gaussians at a time: for rays that do not run
-   together, and for packets whose hits do not fit. No limit but memory. Included by tree_kernel.inc.h. */
+/* trace/tree_ray16.h -- one ray through the tree, sixteen Gaussians at a time: for incoherent rays, and for
+   packets whose hits do not fit.
+
+   Nodes come from a heap, nearest first. Gaussians of leaves whose ellipsoids the ray meets wait until there
+   are sixteen and are evaluated together. After a number of hits (RAY_ROUND, then more) these are sorted,
+   those nearer than the nearest node in the heap are blended, the others stay for the next round. The only
+   limit is memory. Included by tree_kernel.inc.h. */
 #ifndef GBT_TRACE_TREE_RAY16_H
 #define GBT_TRACE_TREE_RAY16_H
 
@@ -109,13 +114,13 @@ static bool blend_hits(ray_state *r, const kernel_scene *scene, float horizon, u
     return true;
 }
 
-/* What nodes and leaves are tested with. */
+/* What is found once per ray to test nodes and leaves. */
 typedef struct ray_walk {
     float origin[3], inverse[3]; /* 1 / direction, finite */
     int enter[3], leave[3];      /* float offset of lower_* or upper_* in a tree_node */
     float across[2][3];          /* two axes at right angles to the ray */
     float square[3][6];          /* their products: uu vv uv */
-    float open;                  /* added to variances for what coordinates may be off */
+    float open;                  /* added to variances, for errors of the coordinates */
     float t_near;
 } ray_walk;
 
@@ -143,8 +148,8 @@ static ray_walk make_walk(const kernel_scene *scene, const float origin[3], cons
     axis_products(u, u, w.square[0]);
     axis_products(v, v, w.square[1]);
     axis_products(u, v, w.square[2]);
-    /* An ellipse and a disc of radius s around it lie within 1.001 times its covariance and 1001 s^2; s is 16
-       roundings of the largest coordinate. */
+    /* The sum of an ellipse and a disc of radius s lies within the ellipse of 1.001 times the covariance plus
+       1001 s^2; s is 16 roundings of the largest coordinate. */
     const float slack = 0x1p-20f * scene->coordinate_max;
     w.open = 1001 * slack * slack;
     return w;
@@ -166,7 +171,8 @@ static inline unsigned walk_children(const ray_walk *w, const tree_node *node, f
     return vmask16_bits(vfloat16_le(vfloat16_mul(enter, vfloat16_set1(0.999998f)), leave));
 }
 
-/* Which ellipsoids the ray's line meets: (x, y) is the line as seen from the centre, across the line. */
+/* Which ellipsoids the line of the ray meets, both projected along it; (x, y): the centre relative to the
+   line. */
 static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
 {
     vfloat16 offset[3], s[6];
@@ -187,10 +193,10 @@ static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
                        vfloat16_mul(x, x), yy,
                        vfloat16_fma(vfloat16_mul(y, y), xx, vfloat16_mul(vfloat16_set1(-2), cross))),
                    most = vfloat16_fnma(xy, xy, vfloat16_mul(xx, yy));
-    return vmask16_bits(vfloat16_lt(most, form)) ^ 0xFFFF; /* NaN: it may */
+    return vmask16_bits(vfloat16_lt(most, form)) ^ 0xFFFF; /* NaN counts as a hit */
 }
 
-/* Evaluate `count` of the waiting Gaussians, at most sixteen, from the end. */
+/* Evaluates the last `count` of the waiting Gaussians, at most sixteen. */
 static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes *ray, int count,
                         tree_scratch *scratch, kernel_counters *counters)
 {
@@ -218,8 +224,8 @@ static bool hit_waiting(ray_state *r, const kernel_scene *scene, const ray_lanes
     return true;
 }
 
-/* Gaussians of a leaf whose ellipsoids the ray meets join those that wait. Few of a leaf do: those of several
-   leaves are evaluated together. */
+/* Appends the Gaussians of a leaf whose ellipsoids the ray meets to the waiting ones. They are few, so those
+   of several leaves are evaluated together. */
 static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
                        const tree_leaf *leaf, tree_scratch *scratch, kernel_counters *counters)
 {
@@ -229,7 +235,7 @@ static bool visit_leaf(ray_state *r, const kernel_scene *scene, const ray_walk *
     return r->waiting_count < TREE_WIDTH || hit_waiting(r, scene, ray, TREE_WIDTH, scratch, counters);
 }
 
-/* Leaves that the ray enters are visited, nodes wait in the heap. */
+/* Visits the leaves of a node that the ray enters; child nodes go to the heap. */
 static bool visit_node(ray_state *r, const kernel_scene *scene, const ray_walk *walk, const ray_lanes *ray,
                        const tree_node *node, int *heap_count, tree_scratch *scratch,
                        kernel_counters *counters)
@@ -268,7 +274,7 @@ static bool gather_ray(ray_state *r, const kernel_scene *scene, const ray_walk *
                 return false;
             if (!r->alive || heap_count == 0)
                 return true;
-            round = 2 * r->count + RAY_ROUND; /* what stays is sorted again, but not often */
+            round = 2 * r->count + RAY_ROUND; /* hits that stay are sorted again; doubling keeps that rare */
         }
         node = (const tree_node *)(uintptr_t)heap_pop(scratch->heap, &heap_count);
     }

@@ -42,8 +42,8 @@ typedef struct sorted_rows {
     int count;
 } sorted_rows;
 
-/* The range of rows that a block's depths overlap with. Moves along the rows from block to block; start from
-   {0}. */
+/* The range of rows whose depths overlap with those of a block of ROW_BLOCK rows. It only moves forward from
+   block to block; start from {0}. */
 typedef struct row_window {
     int low, high;
 } row_window;
@@ -68,8 +68,8 @@ static inline float row_depths(const float *t, int count, float *near, float *fa
     return vfloat16_lowest(nearest);
 }
 
-/* Row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of it,
-   farthest depth so far. */
+/* Places row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of
+   the row, farthest depth so far. */
 static inline void place_row(sorted_rows *o, int i, vfloat16 t, vfloat16 clear, float near, float far,
                              vfloat16 *product, float *reached)
 {
@@ -177,8 +177,9 @@ static inline bool row_before(const packet_rows *p, const round_rows *o, int a, 
     return o->row_near[a] < o->row_near[b] || (o->row_near[a] == o->row_near[b] && p->id[a] < p->id[b]);
 }
 
-/* order[place] = number of the key that comes there: as many keys are smaller. Room for 16 more keys is
-   overwritten. True when some keys are equal; they are in the order of their numbers then. */
+/* Ranks keys by counting: order[place] = the number of the key with that many smaller ones. Sixteen floats
+   behind the last key are overwritten. Equal keys stay in the order of their numbers; returns whether there
+   are any. */
 static inline bool rank_keys(float *key, int n, uint16_t *order)
 {
     const int blocks = (n + 15) / 16;
@@ -224,7 +225,8 @@ static inline void order_rows(const packet_rows *p, float horizon, round_rows *o
     }
 }
 
-/* Copies in order, running product, running far depth. Hits at or behind the horizon are left out. */
+/* Copies the rows in order, with the running product and the running farthest depth. Hits at or behind the
+   horizon are left out. */
 static inline void arrange_rows(const packet_rows *p, float horizon, round_rows *o)
 {
     const vfloat16 limit = vfloat16_set1(horizon), infinite = vfloat16_set1(INFINITY), one = vfloat16_set1(1);

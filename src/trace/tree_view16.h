@@ -19,7 +19,8 @@ typedef struct view_gaussians {
                                                   2^(-FALLOFF y / den) */
 } view_gaussians;
 
-/* What turns the adjoint's sums back into the Gaussian's own axes: the three turned axes, and R. */
+/* What turns the sums of the adjoint back into the Gaussian's own axes: the three turned axes of
+   view_form16.h, and R. */
 typedef struct view_axes {
     vfloat16 e[3][3], distance;
 } view_axes;
@@ -35,7 +36,7 @@ static inline view_rays see_rays(const packet_rays *rays, const tile_beam *b)
     return v;
 }
 
-/* Returned are the lanes whose form is sound. `axes` may be NULL. */
+/* Returns the lanes whose form is sound. `axes` may be NULL. */
 static inline vmask16 view_gaussians_from(const gaussian_lanes *g, const tile_beam *b, view_gaussians *out,
                                           view_axes *axes)
 {

@@ -19,8 +19,8 @@ static inline four_floats four_load(const float *p)
 
 static inline void four_store(float *p, four_floats v) { memcpy(p, &v, sizeof v); }
 
-/* x0 y0 z0 x1, y1 z1 x2 y2, z2 x3 y3 z3 to x0 x1 x2 x3, and so on. Every step takes two of one and two of the
-   other, which is one instruction. */
+/* From x0 y0 z0 x1, y1 z1 x2 y2, z2 x3 y3 z3 to x0 x1 x2 x3, and so on. Every step takes two elements of each
+   operand, which is one shuffle instruction. */
 static inline void load_triples(const float *from, four_floats out[3])
 {
     const four_floats a = four_load(from), b = four_load(from + 4), c = four_load(from + 8);

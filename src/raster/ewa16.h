@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/ewa16.h -- the EWA form: a tile's splats blended in the order of its list, and the adjoint. Included
-   by kernel.inc.h.
+/* raster/ewa16.h -- the EWA form: the splats of a tile blended in the order of its list, and the adjoint.
 
-   Forward takes a chunk of the list at a time: which blocks does each splat reach, then block by block, with
-   the pixels in registers. The adjoint goes back to front, splat by splat, so that the sums of a splat over
-   the tile's blocks stay in registers; T is found again by division from what was left at the end. */
+   The forward pass takes the list in chunks: which blocks each splat reaches, then block by block, with the
+   pixels in registers. The adjoint goes back to front, splat by splat, so that the sums of a splat over the
+   blocks of the tile stay in registers; T in front of a splat is T behind it / (1 - alpha), starting from
+   what the tape has kept. Included by kernel.inc.h. */
 #ifndef GBT_RASTER_EWA16_H
 #define GBT_RASTER_EWA16_H
 
@@ -12,9 +12,9 @@
 
 enum { CHUNK = 128 };
 
-/* Sixteen pixels of a block and one splat. */
+/* One splat on the sixteen pixels of a block. */
 typedef struct ewa_response {
-    vfloat16 u, v, raw; /* raw: alpha before its cut */
+    vfloat16 u, v, raw; /* raw: alpha before it is cut at alpha_max */
 } ewa_response;
 
 static inline ewa_response ewa_respond(const splat *s, float x, float y, int block)
@@ -105,7 +105,7 @@ static inline void blend_block(tile_job *job, const ewa_chunk *chunk, size_t fir
     job->blended += blended;
 }
 
-/* Which blocks do the splats of a chunk reach, of those that are not done. */
+/* Lists, for each block in `open`, the splats of a chunk that reach it. */
 static inline void take_chunk(const tile_job *job, size_t first, size_t count, unsigned open,
                               ewa_chunk *chunk)
 {
@@ -166,10 +166,10 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
     return true;
 }
 
-/* Pixels of a block on the way back. */
+/* The pixels of a block in the adjoint. */
 typedef struct ewa_return {
-    vfloat16 transmittance; /* behind the present splat */
-    vfloat16 behind;        /* what stands behind it, over that, times dL/d(rgb) */
+    vfloat16 transmittance; /* T behind the splat at hand */
+    vfloat16 behind;        /* g . B: B the colour behind the splat, divided by T there; g = dL/d(rgb) */
     vfloat16 d_rgb[3], stop;
 } ewa_return;
 
@@ -202,7 +202,7 @@ static inline void return_through(const tile_job *job, const splat *s, const flo
     sum[EWA_WEIGHT] = vfloat16_add(sum[EWA_WEIGHT], weight);
 }
 
-/* Each of `count` rows, summed over its lanes. */
+/* Sums each of `count` rows over its lanes. */
 static inline void store_sums(const vfloat16 *sum, int count, float *out)
 {
     _Alignas(64) float total[16];

@@ -11,7 +11,7 @@
 
    Per ray, with v the canonical point nearest to the mean, whose depth needs no derivative (docs/tracing.md):
    dL/dmean = R S^-1 sum q v, P = sum q v v^T. Both ways dL/ds_k = P_kk / s_k, and turning the local axes by
-   omega gives dL/domega = (P_yz (s_y / s_z - s_z / s_y), ...): a Gaussian that is round does not feel it. */
+   omega gives dL/domega = (P_yz (s_y / s_z - s_z / s_y), ...): it is 0 for a Gaussian that is round. */
 #include "raster/gradients.h"
 
 #include <string.h>
@@ -31,7 +31,7 @@ typedef struct gradient_job {
     float *weight;
 } gradient_job;
 
-/* What both forms leave: dL/dmean in world axes, and P. */
+/* What both forms have in common: dL/dmean in world axes, and P. */
 typedef struct shape_gradient {
     double mean[3], p[3][3];
 } shape_gradient;
@@ -52,9 +52,9 @@ static one_gaussian read_gaussian(const gaussians *g, size_t i)
     return out;
 }
 
-/* One row of the projection (x or y), with ratio = X / Z: the image point is focal ratio + shift, the axes'
-   image focal / Z (a_row - k a_z), and k is the ratio kept within limits. Sets dL/d(X or Y) and adds to
-   dL/dZ. */
+/* The adjoint of one row of the projection (x or y). With ratio = X / Z the image point is focal ratio +
+   shift, and the image of axis a is focal / Z (a_row - k a_z), where k is the ratio kept within limits. Sets
+   dL/d(X or Y), adds to dL/dZ. */
 static void return_row(double focal, double ratio, double k, double z_inverse, const double a[3],
                        const double az[3], double d_point, const double d_y[3], double *d_x, double *d_z)
 {
@@ -168,7 +168,7 @@ static void return_block(size_t block, size_t begin, size_t end, void *context)
             job->view->settings.form == RASTER_EWA ? return_ewa(job->view, &g, s, sum) : return_ray(&g, sum);
         const double *color = sum + (job->view->settings.form == RASTER_EWA ? EWA_COLOR : RAY_COLOR);
         if (job->weight != NULL)
-            job->weight[i] = (float)color[3]; /* it stands behind the colour in both forms */
+            job->weight[i] = (float)color[3]; /* the weight follows the colour in both forms */
         store_gradient(&g, &d, i, job->out);
         job->out->opacity[i] = (float)(sum[0] / (double)s->opacity);
         job->out->red[i] = (float)color[0];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/kernel.h -- the contract between raster.c and its kernels, which are compiled per instruction set
+/* raster/kernel.h -- the interface between raster.c and its kernels, which are compiled per instruction set
    (kernel.inc.h).
 
    Image points are counted in pixels from the centre of the first pixel: pixel (i, j) is at (i, j). */
@@ -29,9 +29,10 @@ typedef struct raster_view {
     int width, height, tiles_across, tiles_down;
 } raster_view;
 
-/* A Gaussian that is drawn: where it reaches, and what a pixel of the EWA form needs of it. With (dx, dy) =
-   centre - pixel, u = chol[0] dx + chol[1] dy and v = chol[2] dy, nothing is drawn where u^2 + v^2 > reach.
-   EWA: the response is 2^-(u^2 + v^2), so (u, v) are the canonical point times the root of HALF_LOG2_E. */
+/* A Gaussian that is drawn: where it reaches, and what a pixel of the EWA form needs. With (dx, dy) from a
+   pixel to the centre, u = chol[0] dx + chol[1] dy and v = chol[2] dy, nothing is drawn where u^2 + v^2 >
+   reach. EWA: the response is 2^-(u^2 + v^2), so (u, v) is the canonical point times the root of
+   HALF_LOG2_E. */
 typedef struct splat {
     double center[2];
     float chol[3], reach;
@@ -69,7 +70,7 @@ typedef struct tile_pixels {
     _Alignas(64) float background[TILE_BLOCKS][3][PIXEL_LANES]; /* in */
 } tile_pixels;
 
-/* What forward leaves for backward beside the lists. */
+/* What the forward pass leaves for the adjoint, in addition to the lists. */
 typedef struct tile_tape {
     _Alignas(64) float transmittance[TILE_BLOCKS][PIXEL_LANES];
     _Alignas(64) float stop[TILE_BLOCKS][PIXEL_LANES]; /* EWA: number of the entry that the pixel stopped at,
@@ -77,8 +78,9 @@ typedef struct tile_tape {
     size_t used;                                       /* EWA: entries that were looked at */
 } tile_tape;
 
-/* Sums that a tile leaves per pair. EWA, with q = dL/d(log alpha), 0 where alpha is cut: q, q u, q v, q u u,
-   q u v, q v v; colour; weight T alpha. Per ray: q, q v (3), q v v (xx yy zz yz zx xy); colour; weight. */
+/* The sums that a tile leaves for each pair, with q = dL/d(log alpha), which is 0 where alpha is cut. EWA: q,
+   q u, q v, q u u, q u v, q v v; colour; weight T alpha. Per ray: q, q v (3), q v v (xx yy zz yz zx xy);
+   colour; weight. */
 enum { EWA_COLOR = 6, EWA_WEIGHT = 9, EWA_SUMS, RAY_COLOR = 10, RAY_WEIGHT = 13, RAY_SUMS };
 
 static inline size_t raster_sum_count(raster_form form) { return form == RASTER_EWA ? EWA_SUMS : RAY_SUMS; }

@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/order.c -- a radix sort by depth, and a counting sort into tiles that keeps its order.
+/* raster/order.c -- the lists of the tiles: a radix sort of the splats by depth, then a counting sort into
+   tiles.
 
-   depths --> radix sort --> blocks of splats: tiles reached, a histogram per block
-        --> place of each block in each tile --> lists */
+     depths --> radix sort (3 passes of 11 bits, stable) --> blocks of splats in that order
+     each block --> tiles reached, a histogram over the tiles
+     histograms --> where each block begins in the list of each tile --> lists
+
+   Counting sort is stable, so every list keeps the order of depth. Blocks depend on counts alone: the same
+   lists for any number of threads. */
 #include "raster/order.h"
 
 #include <stdatomic.h>
@@ -22,7 +27,7 @@ enum {
     TILE_ENTRIES = 1 << 24
 };
 
-/* Elements per block, so that there are no more than `blocks`. */
+/* Elements per block, so that there are at most `blocks` blocks. */
 static size_t grain_of(size_t count, size_t blocks)
 {
     const size_t grain = (count + blocks - 1) / blocks;
@@ -40,7 +45,7 @@ typedef struct radix_job {
     int shift;
 } radix_job;
 
-/* Bits that are in the order of the numbers. */
+/* Maps the bits of a float so that unsigned integers are in the order of the numbers, negative ones too. */
 static uint32_t ordered_bits(float a)
 {
     uint32_t bits;
@@ -75,7 +80,8 @@ static void move_keys(size_t block, size_t begin, size_t end, void *context)
         job->to[place[job->from[i] >> job->shift & (RADIX - 1)]++] = job->from[i];
 }
 
-/* Counts per block and digit become the place of the first of each, digit by digit, block by block. */
+/* Exclusive prefix sum, digit by digit and block by block within: counts per block and digit become the place
+   of the first key of each. */
 static void counts_to_places(uint32_t (*place)[RADIX], size_t blocks)
 {
     uint32_t next[RADIX] = {0}, first = 0;
@@ -95,7 +101,7 @@ static void counts_to_places(uint32_t (*place)[RADIX], size_t blocks)
         }
 }
 
-/* Places of the first keys of all blocks of Gaussians. */
+/* Where the keys of each block of Gaussians begin. */
 static gbt_status number_splats(tile_lists *lists, const size_t *drawn, size_t count, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(count, SPLAT_GRAIN);
@@ -132,7 +138,7 @@ static gbt_status sort_by_depth(tile_lists *lists, const splat *splats, size_t g
         counts_to_places(job.place, parallel_block_count(count, grain));
         parallel_blocks(count, grain, move_keys, &job);
     }
-    uint64_t *const sorted = lists->spare; /* an odd number of passes */
+    uint64_t *const sorted = lists->spare; /* the number of passes is odd */
     const size_t sorted_capacity = lists->spare_capacity;
     lists->spare = lists->keys;
     lists->spare_capacity = lists->key_capacity;
@@ -197,7 +203,7 @@ static void place_pairs(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* Of tiles [begin, end): all pairs, into the next tile's `first`. */
+/* Counts all pairs of each of the tiles [begin, end), into first[tile + 1]. */
 static void count_tiles(size_t range, size_t begin, size_t end, void *context)
 {
     (void)range;
@@ -210,7 +216,7 @@ static void count_tiles(size_t range, size_t begin, size_t end, void *context)
             total[tile] += job->lists->histogram[block * job->tile_count + tile];
 }
 
-/* Counts per block become places in the lists of tiles [begin, end). */
+/* For tiles [begin, end): counts per block become places in the list of the tile. */
 static void place_blocks(size_t range, size_t begin, size_t end, void *context)
 {
     (void)range;
@@ -227,7 +233,7 @@ static void place_blocks(size_t range, size_t begin, size_t end, void *context)
         }
 }
 
-/* Counts per block and tile become places in the list of all tiles. */
+/* Counts per block and tile become places in the entries of all tiles. */
 static gbt_status place_all(pair_job *job, gbt_error *err)
 {
     tile_lists *lists = job->lists;

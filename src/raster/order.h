@@ -5,8 +5,8 @@
 
 #include "raster/kernel.h"
 
-/* Numbers of the pairs of a splat: in the order of the splats, so that their records are read one after the
-   other. */
+/* The numbers of the pairs of a splat. They are counted in the order of the splats, so that
+   raster_gradients() reads records one after the other. */
 typedef struct pair_range {
     uint32_t first, count;
     uint32_t place; /* internal: where its tiles begin in their block */

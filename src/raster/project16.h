@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* raster/project16.h -- Gaussians to splats: projection, box of tiles, sixteen at a time in double (Kerbl
-   2023, eq 5).
+/* raster/project16.h -- from Gaussians to splats: projection (Kerbl 2023, eq 5) and box of tiles, sixteen at
+   a time.
 
-   Doubles, because a pixel may lie thousands of pixels from a corner and a Gaussian's edge is a third of one.
-   The loops over lanes are plain C that compilers turn into vectors; no operation is fused, so all
+   In double, because a pixel may lie thousands of pixels from a corner and the edge of a Gaussian is a third
+   of a pixel wide. The loops over lanes are plain C that compilers vectorise; no operation is fused, so all
    instruction sets give the same bits. Included by kernel.inc.h. */
 #ifndef GBT_RASTER_PROJECT16_H
 #define GBT_RASTER_PROJECT16_H
@@ -81,7 +81,7 @@ static inline void project_lanes(const raster_view *view, lane_splats *s)
     }
 }
 
-/* Finite fields, scales that are scales, and something to see. */
+/* Whether a Gaussian has finite fields, positive scales, and an opacity that can be seen. */
 static inline bool is_drawable(const raster_view *view, const gaussians *g, size_t i)
 {
     const float q = g->quat_w[i] + g->quat_x[i] + g->quat_y[i] + g->quat_z[i],
@@ -101,8 +101,8 @@ static inline void tile_range(double low, double high, int tiles, uint16_t out[2
     out[1] = (uint16_t)(end < 0 ? 0 : end > tiles ? tiles : end);
 }
 
-/* The form of kernel.h of a covariance with xy, yy and this determinant, times factor. False when float
-   cannot hold it. */
+/* Sets the centre of a splat and its factor `chol` (kernel.h) for a covariance with xy, yy and this
+   determinant; the form is multiplied by `factor`. False when float cannot hold it. */
 static inline bool store_ellipse(double x, double y, double xy, double yy, double det, double factor,
                                  splat *out)
 {
@@ -117,8 +117,8 @@ static inline bool store_ellipse(double x, double y, double xy, double yy, doubl
     return fine;
 }
 
-/* Where the response falls to alpha_min, in units of d2, and a little further: only what cannot be seen is
-   left out. */
+/* The d2 at which the response falls to alpha_min, and a little more: only what cannot be seen is left
+   out. */
 static inline double cut_square(const raster_view *view, float opacity)
 {
     return 2 * log((double)opacity / (double)view->settings.alpha_min) * (1 + 1e-5) + 1e-4;
@@ -143,8 +143,8 @@ static inline bool finish_ewa(const raster_view *view, const lane_splats *s, int
     return out->box[0] < out->box[1] && out->box[2] < out->box[3];
 }
 
-/* The outline of the proxy ellipsoid at `cut`, exactly: with Q its shape in camera space and m the mean,
-   lines l of the image plane touch it where l^T (m m^T - Q) l = 0, the dual of an ellipse. An ellipsoid that
+/* The exact outline of the proxy ellipsoid at `cut`: with Q its shape in camera space and m the mean, lines l
+   of the image plane touch it where l^T (m m^T - Q) l = 0, which is the dual of an ellipse. An ellipsoid that
    reaches behind the eye may be seen anywhere. */
 static inline bool store_outline(const raster_view *view, const lane_splats *s, int lane, splat *out)
 {
@@ -173,8 +173,8 @@ static inline bool store_outline(const raster_view *view, const lane_splats *s, 
     const double a = dual[0][2] / front, b = dual[1][2] / front, fx = view->fx, fy = view->fy;
     const double xx = fx * fx * (a * a - dual[0][0] / front), yy = fy * fy * (b * b - dual[1][1] / front);
     const double xy = fx * fy * (a * b - dual[0][1] / front);
-    /* A hundredth of a pixel more on all sides covers the rounding of rays; a determinant lost to rounding
-       leaves the box. */
+    /* A hundredth of a pixel more on all sides covers the rounding of rays. Where rounding destroys the
+       determinant, the box of all tiles stays. */
     const double wide_xx = xx + 1e-4 + 1e-4 * xx, wide_yy = yy + 1e-4 + 1e-4 * yy,
                  det = wide_xx * wide_yy - xy * xy;
     const double x = fx * a + view->cx, y = fy * b + view->cy, half_x = sqrt(wide_xx), half_y = sqrt(wide_yy);

@@ -53,7 +53,8 @@ static size_t tile_count_of(const raster_view *view)
 
 static gbt_status check_settings(const raster_settings *s, gbt_error *err)
 {
-    /* The smallest alpha and T: 2^-120 of an opacity is nothing, and T is found again by division. */
+    /* The smallest alpha and T: the response is cut off at 2^-120 of the opacity, and the adjoint finds T by
+       division. */
     const bool fine = (s->form == RASTER_EWA || s->form == RASTER_PER_RAY) && s->alpha_min >= 1e-30f &&
                       s->alpha_min < 1 && s->alpha_max > 0 && s->alpha_max < 1 &&
                       s->transmittance_min >= 1e-30f && s->transmittance_min < 1 && s->near >= 0 &&
@@ -196,7 +197,7 @@ static bool backward_tile(const pass *p, tile_job *job, ray_scratch *scratch)
     return p->state->kernel->backward[job->view->settings.form](job, scratch);
 }
 
-/* What every pixel of a tile sees behind everything. */
+/* The background of every pixel of a tile. */
 static void look_behind(const tile_job *job)
 {
     const raster_view *view = job->view;

@@ -5,8 +5,9 @@
    Two forms. RASTER_EWA has the conventions of 3D Gaussian splatting: each Gaussian becomes a 2D Gaussian by
    the affine projection at its centre (Zwicker 2001; Kerbl 2023, eq 5), dilated by 0.3 px^2, and all pixels
    blend in the order of the centres' depths. RASTER_PER_RAY keeps the tiles but takes response and order from
-   the ray of each pixel, as docs/tracing.md defines them: what is left between the two is the projection and
-   the order. Shares with the tracer the cameras and the Gaussian arrays, nothing else. */
+   the ray of each pixel, as docs/tracing.md defines them: so the difference between the two is that of
+   projection and order. The rasterizer shares the cameras and the Gaussian arrays with the tracer, nothing
+   else. */
 #ifndef GBT_RASTER_RASTER_H
 #define GBT_RASTER_RASTER_H
 
@@ -35,7 +36,7 @@ typedef struct raster_settings {
     bool exact_cut;       /* EWA: draw to where alpha falls to alpha_min, not to 3 std-devs. Default false */
     bool order_by_center; /* per ray: blend in the order of the centres' depths, as EWA does. Default false */
     float background[3];  /* default 0 */
-    sky sky;              /* what is added to it by the ray's direction. Default nothing */
+    sky sky;              /* added to it as a function of the ray's direction. Default nothing */
 } raster_settings;
 
 raster_settings raster_settings_default(void);
@@ -54,8 +55,8 @@ typedef struct raster_scene {
 /** Whether a camera is one that raster_forward() takes: PINHOLE or SIMPLE_PINHOLE, standing still. */
 bool raster_takes(const gbt_camera *camera);
 
-/** EWA: what x / z and y / z of a centre are kept within in the projection's Jacobian, the picture and 0.15
-   of it on each side. `camera`: one that raster_takes(). */
+/** EWA: the limits of x / z and y / z of a centre in the Jacobian of the projection: the picture and 0.15 of
+    it on each side. `camera`: one that raster_takes(). */
 void raster_limits(const gbt_camera *camera, double low[2], double high[2]);
 
 /**

@@ -25,8 +25,8 @@ typedef struct ray_hit {
     uint32_t row;
 } ray_hit;
 
-/* Rays (a, b, 1) in camera axes; a and b from those of the middle of the block, so that differences to a mean
-   keep their digits. */
+/* Rays (a, b, 1) in camera axes; a and b are relative to the middle of the block, so that differences to a
+   mean keep their digits. */
 typedef struct block_rays {
     double middle[2];
     vfloat16 a, b, length, depth_near;
@@ -97,10 +97,10 @@ static inline ray_response ray_respond(const ray_splat *g, float opacity, const 
     return r;
 }
 
-/* v at an inner depth once more, for the adjoint: v = w x (y x w) / |w|^2 with y x w = m/sigma (da wa x w0 +
-   db wb x w0), the rest cancels exactly. On a flat Gaussian the v of ray_respond() is a small difference of
-   large numbers along the thin axis. d2 does not feel that, but the gradients of mean and rotation, which are
-   divided by the thin axis, do. Not where y0 has a part in y. */
+/* Computes v at an interior depth again, for the adjoint: v = w x (y x w) / |w|^2 with y x w = m/sigma (da wa
+   x w0 + db wb x w0), as the rest cancels exactly. On a flat Gaussian the v of ray_respond() is a small
+   difference of large numbers along the thin axis. d2 is not affected by that, but the gradients of mean and
+   rotation, which are divided by the thin axis, are. Not where y0 is part of y. */
 static inline void refine_v(const ray_splat *g, ray_response *r)
 {
     double a[3], b[3];
@@ -124,7 +124,7 @@ static inline void refine_v(const ray_splat *g, ray_response *r)
     }
 }
 
-/* Which blocks does every entry of the tile reach. False when memory ran out. */
+/* Which blocks every entry of the tile reaches. False when memory ran out. */
 static inline bool find_reached(const tile_job *job, ray_scratch *scratch)
 {
     if (mem_reserve((void **)&scratch->reached, &scratch->reached_capacity, 0, job->count,
@@ -175,7 +175,8 @@ static int compare_hits(const void *a, const void *b)
     return (p->key > q->key) - (p->key < q->key);
 }
 
-/* The list of the tile is nearly in order already: insertion is quick, unless it turns out not to be. */
+/* Insertion sort, because the list of the tile is nearly in this order already; qsort() if it takes too many
+   moves. */
 static inline void sort_ray(ray_hit *hits, size_t count)
 {
     size_t moves = 16 * count;
@@ -281,7 +282,7 @@ static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_co
     }
 }
 
-/* What the rays of a block add to the record of one splat. */
+/* Adds the terms of a row, summed over the rays of a block, to the record of its splat. */
 static inline void add_row(const tile_job *job, const ray_row *row, const block_rays *rays,
                            const vfloat16 d_rgb[3])
 {
@@ -296,7 +297,7 @@ static inline void add_row(const tile_job *job, const ray_row *row, const block_
     const vfloat16 q = vfloat16_select(moves, vfloat16_mul(r.raw, d_alpha), zero);
     vfloat16 v[3], sum[RAY_SUMS];
     for (int k = 0; k < 3; k++)
-        v[k] = vfloat16_select(moves, r.v[k], zero); /* what is not hit may be anything */
+        v[k] = vfloat16_select(moves, r.v[k], zero); /* v may be anything on rays that do not hit */
     sum[0] = q;
     for (int k = 0; k < 3; k++) {
         sum[1 + k] = vfloat16_mul(q, v[k]);

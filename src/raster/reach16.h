@@ -24,9 +24,9 @@ static inline vfloat16 ellipse_square(const float chol[3], vfloat16 dx, vfloat16
     return vfloat16_fma(u, u, vfloat16_mul(v, v));
 }
 
-/* Does the ellipse about (x, y) reach squares of `side` pixels, 4 x 4 of them from the origin? The form is
-   convex: seen from a square, its smallest value is at the centre, or on the edge that is nearest to it
-   across or down. */
+/* Which of 4 x 4 squares of `side` pixels, counted from the origin, the ellipse about (x, y) reaches. The
+   form is convex: in a square it is smallest at its centre, if that is inside, else on the edge nearest to
+   the centre in x or that in y. So it is minimised along both lines, each clamped to the square. */
 static inline unsigned reached_squares(const splat *s, float x, float y, float side)
 {
     const vfloat16 zero = vfloat16_set1(0), last = vfloat16_set1(side - 1);

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/binary_tree.c -- a binary tree by Embree's builder, and its opening into wider nodes. */
+/* bvh/binary_tree.c -- a binary BVH by Embree's builder, and its collapse into wider nodes.
+
+   rtcBuildBVH (SAH; deterministic at medium quality) calls back for every node and leaf, which are made in
+   its memory. binary_node_open() starts from the two children of a node and replaces the one with the largest
+   surface by its own two children until there are as many as a wide node holds. */
 #include "bvh/binary_tree.h"
 
 #include <string.h>
@@ -7,11 +11,11 @@
 #include "base/fail.h"
 #include "bvh/device.h"
 
-/* Embree cuts into halves what is left 8 nodes above this, and gives up where 2^8 leaves do not hold it.
-   Outliers over all decades of float32 take up to 60 nodes on each side of each axis. */
+/* From 8 levels above this depth on Embree halves what is left, without SAH, and it fails where 2^8 leaves do
+   not hold that. Outliers over all decades of float32 take up to 60 levels on each side of each axis. */
 enum { DEPTH_MAX = 512 };
 
-/* ---- Embree's callbacks; a leaf is a tagged address in place of a pointer ---- */
+/* ---- Embree's callbacks; a leaf is its address with the lowest bit set ---- */
 
 static void *take(binary_tree *tree, RTCThreadLocalAllocator allocator, size_t size)
 {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/binary_tree.h -- what Embree's builder makes for us: a binary tree over boxes, and its opening into
-   nodes of many children. Binary, because its wider builders make as many children as they can and leave
+/* bvh/binary_tree.h -- a binary BVH over boxes, made by Embree's builder, and its collapse into nodes of many
+   children.
+
+   Embree is asked for a binary tree, because its wider builders make as many children as they can and leave
    leaves almost empty. */
 #ifndef GBT_BVH_BINARY_TREE_H
 #define GBT_BVH_BINARY_TREE_H
@@ -27,7 +29,7 @@ typedef struct binary_tree {
     uint64_t root; /* as a child */
     size_t node_count, leaf_count;
     atomic_size_t nodes_made, leaves_made; /* while Embree builds */
-    atomic_bool refused;                   /* an allocation of Embree's was refused: the tree has holes */
+    atomic_bool refused;                   /* an allocation of Embree was refused: the tree is incomplete */
 } binary_tree;
 
 /**
@@ -46,8 +48,8 @@ static inline const binary_leaf *binary_leaf_of(uint64_t child)
     return (child & 1) != 0 ? (const binary_leaf *)(uintptr_t)(child - 1) : NULL;
 }
 
-/** The children of a node that holds up to `width`: of the binary ones below it the largest is opened until
-    there are so many. @return how many */
+/** The children of a wide node in place of the binary one: the largest of them is replaced by its own two
+    children, until there are `width` or only leaves. @return how many */
 int binary_node_open(const binary_node *root, int width, struct RTCBounds *bounds, uint64_t *child);
 
 #endif

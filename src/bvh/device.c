@@ -33,8 +33,8 @@ static void remember_complaint(void *user, enum RTCError code, const char *text)
         snprintf(complaint, sizeof complaint, "%s", text != NULL ? text : "");
 }
 
-/* Embree asks before it allocates, or tells right after (post); what it frees comes as negative bytes. What
-   was refused before it was allocated is never reported as freed. */
+/* Embree calls this before it allocates, or right after (post); freed memory comes as negative bytes. An
+   allocation that was refused before it was made is never reported as freed. */
 static bool watch_memory(void *user, ssize_t bytes, bool post)
 {
     (void)user;
@@ -48,8 +48,8 @@ static bool watch_memory(void *user, ssize_t bytes, bool post)
 
 static const char *configuration(void)
 {
-    /* GBT_ISA holds the kernels of others too: a run that must not use wide vectors does not get them from
-       here. */
+    /* The limit GBT_ISA holds for Embree's kernels, too: a run that must not use wide vectors must not get
+       them from here. */
 #if defined(__x86_64__)
     if (cpu_best_isa() == CPU_PLAIN)
         return "max_isa=sse4.2";
@@ -115,7 +115,7 @@ gbt_status bvh_check(const char *what, gbt_error *err)
     const enum RTCError code = rtcGetDeviceError(device);
     if (code == RTC_ERROR_NONE)
         return GBT_OK;
-    /* What oneTBB could not allocate within Embree comes as an unknown error with the exception's name. */
+    /* When oneTBB cannot allocate within Embree, it is an unknown error with the name of the exception. */
     const bool memory = strstr(complaint, "bad_alloc") != NULL;
     const gbt_status status =
         base_fail(err, memory ? GBT_ERR_NO_MEMORY : error_status(code), "%s: embree: %s%s%s", what,

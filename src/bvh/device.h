@@ -2,7 +2,7 @@
 /* bvh/device.h -- the one Embree device of the process, its errors and its memory, and what every caller must
    check before Embree.
 
-   No Embree type appears here, so that rooms above can report the version or set a limit without seeing
+   No Embree type appears here, so that folders above can report the version or set a limit without including
    Embree. */
 #ifndef GBT_BVH_DEVICE_H
 #define GBT_BVH_DEVICE_H
@@ -50,8 +50,8 @@ size_t bvh_memory_bytes(void);
  */
 void bvh_limit_memory(size_t bytes);
 
-/** Largest |coordinate| that goes to Embree. It drops boxes beyond 1.844e18 without a word, and aborts on
-    such rays. */
+/** Largest |coordinate| that goes to Embree. Embree silently drops boxes beyond 1.844e18, and aborts on such
+    rays. */
 static const float bvh_coordinate_limit = 1e18f;
 
 /** Whether a ray may go to Embree: finite, within the limit, 0 <= t_min <= t_max (t_max may be infinite), a

@@ -3,7 +3,7 @@
    or 4.
 
    What differs: the header's path, the context that travels with a ray, and how one ray is traced. Everything
-   else that the bvh room uses (devices, scenes, point queries, rtcBuildBVH) has the same name and meaning in
+   else that this folder uses (devices, scenes, point queries, rtcBuildBVH) has the same name and meaning in
    both and is called directly. */
 #ifndef GBT_BVH_EMBREE_API_H
 #define GBT_BVH_EMBREE_API_H
@@ -86,9 +86,9 @@ static inline unsigned embree_ray_id(const struct RTCRayHitN *rayhits, unsigned 
     return ((const unsigned *)rayhits)[fields_before * N + i];
 }
 
-/** Around work that Embree spreads over threads: publish what the callbacks will read, receive it first thing
-    in a callback. ThreadSanitizer cannot see how Embree's own library hands work over, and takes it for a
-    race; in other builds both are nothing. */
+/** For ThreadSanitizer, around work that Embree spreads over threads: publish before it what the callbacks
+    will read, and receive it at the start of a callback. The sanitizer cannot see how Embree's own library
+    hands work to threads, and would report a race. In other builds both do nothing. */
 #if defined(__SANITIZE_THREAD__)
 void __tsan_acquire(void *address);
 void __tsan_release(void *address);

@@ -46,10 +46,10 @@ static void box_bounds(const struct RTCBoundsFunctionArguments *args)
                                          .upper_x = box->upper_x,
                                          .upper_y = box->upper_y,
                                          .upper_z = box->upper_z};
-    embree_publish(c); /* that the boxes have been read: the next build writes them */
+    embree_publish(c); /* orders these reads before the next build, which writes the boxes */
 }
 
-/* Interval of t in which each ray is between two planes, cut with what is there. */
+/* Cuts the interval of t of each ray to where it is between two planes. */
 static inline __attribute__((always_inline)) void cut_interval(float lower, float upper, const float *origin,
                                                                const float *inverse, float *enter,
                                                                float *leave)
@@ -62,9 +62,9 @@ static inline __attribute__((always_inline)) void cut_interval(float lower, floa
     }
 }
 
-/* Embree's coherent traversal follows the hull of the packet and calls every box that this meets crossed by
-   all rays, and a scene of one box is called crossed unseen: which rays cross it is found here, with the same
-   bits for every instruction set. */
+/* Embree's coherent traversal follows the hull of the packet and reports every box that the hull meets as
+   crossed by all rays, and it reports the only box of a scene without any test. So which rays cross a box is
+   found here, with the same bits for every instruction set. */
 #define CROSSING_VARIANT(isa, attribute)                                                                     \
     attribute static unsigned crossing_lanes_##isa(const packet *p, const struct RTCBuildPrimitive *box)     \
     {                                                                                                        \
@@ -76,7 +76,7 @@ static inline __attribute__((always_inline)) void cut_interval(float lower, floa
         cut_interval(box->lower_y, box->upper_y, ray->org_y, p->inverse[1], enter, leave);                   \
         cut_interval(box->lower_z, box->upper_z, ray->org_z, p->inverse[2], enter, leave);                   \
         unsigned lanes = 0;                                                                                  \
-        for (unsigned i = 0; i < SCENE_LANES; i++) /* both ends are rounded three times */                   \
+        for (unsigned i = 0; i < SCENE_LANES; i++) /* three roundings at each end */                         \
             lanes |= (unsigned)(enter[i] <= leave[i] * (1 + 0x1p-21f)) << i;                                 \
         return lanes;                                                                                        \
     }
@@ -86,7 +86,8 @@ CROSSING_VARIANT(avx2, __attribute__((target("avx2"))))
 CROSSING_VARIANT(avx512, __attribute__((target("avx512f,avx512dq,avx512vl,prefer-vector-width=512"))))
 #endif
 
-/* Writes nothing to the rays: to Embree every box is missed, and it goes on to the next. */
+/* Embree's intersection callback. It reports no hit: to Embree the ray misses every box, and it goes on to
+   the next. */
 static void reach_box(const struct RTCIntersectFunctionNArguments *args)
 {
     const packet *p = (const packet *)args->context;
@@ -95,7 +96,7 @@ static void reach_box(const struct RTCIntersectFunctionNArguments *args)
     if (args->N == SCENE_LANES) {
         for (unsigned i = 0; i < SCENE_LANES; i++)
             lanes |= (unsigned)(args->valid[i] != 0) << i;
-    } else { /* narrower instruction sets take a packet apart; the number of a ray says where it was */
+    } else { /* narrower instruction sets split a packet; the id of a ray is its lane */
         for (unsigned i = 0; i < args->N; i++)
             lanes |= (unsigned)(args->valid[i] != 0) << embree_ray_id(args->rayhit, args->N, i);
     }
@@ -165,7 +166,8 @@ gbt_status gaussian_scene_build(const gaussians *g, float alpha_min, float reach
     return GBT_OK;
 }
 
-/* One ray into its lane, in a form that Embree takes. False when there is none: the ray crosses nothing. */
+/* Writes one ray into its lane, in a form that Embree accepts. False for a ray that it cannot trace: that
+   crosses nothing. */
 static bool set_lane(packet *p, struct RTCRay16 *ray, unsigned i, const float origin[3], const float dir[3],
                      float t_near, float t_far)
 {
@@ -187,7 +189,7 @@ static bool set_lane(packet *p, struct RTCRay16 *ray, unsigned i, const float or
     ray->dir_z[i] = scaled[2];
     ray->tnear[i] = t_near;
     ray->tfar[i] = t_far;
-    for (int axis = 0; axis < 3; axis++) /* Embree takes smaller components for these */
+    for (int axis = 0; axis < 3; axis++) /* Embree replaces smaller components by these */
         p->inverse[axis][i] =
             1 / (fabsf(scaled[axis]) < 1e-18f ? copysignf(1e-18f, scaled[axis]) : scaled[axis]);
     return true;

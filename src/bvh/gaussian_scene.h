@@ -46,7 +46,7 @@ typedef void gaussian_visit_fn(uint32_t id, unsigned lanes, void *user);
  * dir; once for each such ray.
  *
  * A Gaussian may be visited several times with different lanes, since Embree splits packets whose rays part.
- * A box is called crossed as far as float32 can tell, never less than that. Which rays are visited in one
+ * The test in float32 is conservative: no crossing is missed. Which rays are visited in one
  * call, and the order of calls, depend on the instruction set.
  *
  * @param dir    [in] any length but 0; need not be unit

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/gaussian_tree.c -- Embree's builder over the boxes of Gaussians, its nodes laid out for our kernels. */
+/* bvh/gaussian_tree.c -- the 16-wide tree over Gaussians: Embree's builder, its nodes laid out for our
+   kernels.
+
+     Gaussians --> boxes of their proxies (proxy.c) --> binary tree, leaves of up to 16 (binary_tree.c)
+         --> [widen] nodes of 16 children, depth first --> [fill_leaves] ellipsoids in SoA layout */
 #include "bvh/gaussian_tree.h"
 
 #include <math.h>
@@ -37,7 +41,8 @@ static void node_clear(tree_node *node)
     }
 }
 
-/* A little more than k^2 R S S R^T: the kernels' test adds what rounding needs beyond that. */
+/* The covariance k^2 R S S R^T of the proxy, 1e-4 larger for its own rounding; the kernels add what their
+   tests need. */
 static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t slot)
 {
     const gaussians *g = b->g;
@@ -80,7 +85,7 @@ static uint64_t place_leaf(builder *b, uint64_t child)
     return (uint64_t)(uintptr_t)&b->leaves[b->filled_count++] + 1;
 }
 
-/* The wide node for a binary one. Depth first, so that neighbours lie side by side. */
+/* The wide node in place of a binary one. Depth first, so that neighbours lie side by side. */
 static tree_node *widen(builder *b, const binary_node *root)
 {
     struct RTCBounds bounds[TREE_WIDTH];
@@ -102,7 +107,7 @@ static tree_node *widen(builder *b, const binary_node *root)
     return node;
 }
 
-/* Few Gaussians make one leaf, and the node above it is ours. Nothing is culled there. */
+/* Few Gaussians make one leaf and no node: puts a node above it, in which nothing is culled. */
 static void single_node(builder *b, uint64_t leaf)
 {
     tree_node *node = &b->nodes[b->node_count++];

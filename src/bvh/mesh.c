@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/mesh.c -- rays against a triangle mesh.
 
-   vertices, triangles --> [check, copy into Embree's buffers] --> commit
-        --> rtcIntersect1 finds hits, a filter settles them in double
+     vertices, triangles --> [check, copy into Embree's buffers] --> commit
+          --> rtcIntersect1 finds candidates, a filter decides about each in double
 
-   Embree keeps the only copy of the mesh: distances and normals are taken from its buffers. */
+   Embree keeps the only copy of the mesh: distances and normals are computed from its buffers. */
 #include "bvh/mesh.h"
 
 #include <float.h>
@@ -63,8 +63,8 @@ static bool meet(const search *s, uint32_t triangle, double *t, double *u, doubl
     return isfinite(*t) && isfinite(*u) && isfinite(*v);
 }
 
-/* A hit that Embree offers, decided by the exact t: recorded when it is in the range and better than the best
-   so far. */
+/* Decides about a hit that Embree offers, by the exact t: it is recorded if it is in range and better than
+   the best so far. */
 static bool take(const struct RTCFilterFunctionNArguments *args)
 {
     search *s = (search *)args->context;
@@ -76,13 +76,15 @@ static bool take(const struct RTCFilterFunctionNArguments *args)
     const float t = (float)t_exact;
     if (!(t > 0 && t <= s->t_max && (t < s->best.t || (t == s->best.t && triangle < s->best.triangle))))
         return false;
-    /* Not cut to the triangle: at an edge that would move the point by what Embree's float is off. */
+    /* u and v are not clamped to the triangle: at an edge that would move the point by the error of Embree's
+       float. */
     s->best = (mesh_hit){.t = t, .u = u, .v = v, .triangle = triangle};
     return true;
 }
 
-/* For both kinds of query. Embree keeps the last hit that is not refused and offers only nearer or equal ones
-   after it: without a choice by number, equal ones would be settled by the shape of the tree. */
+/* The filter of both kinds of query. Embree keeps the last hit that is not refused, and afterwards offers
+   only nearer or equal ones. Without the choice by number, the shape of the tree would decide between equal
+   ones. */
 static void filter(const struct RTCFilterFunctionNArguments *args)
 {
     if (!take(args))
@@ -117,7 +119,7 @@ static gbt_status fill_scene(mesh_tree *tree, RTCDevice device, const float *ver
     gbt_status status = bvh_check("mesh", err);
     if (status != GBT_OK)
         goto done;
-    /* Embree wants 16 readable bytes at every vertex, which buffers of its own have and the caller's may
+    /* Embree reads 16 bytes at every vertex. Its own buffers have room for that; those of the caller may
        not. */
     float *vertex = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                             3 * sizeof *vertex, vertex_count);
@@ -167,9 +169,9 @@ gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uin
     return GBT_OK;
 }
 
-/* False when the ray cannot be traced. Embree gets a range a little wider than asked, since the filter
-   decides in double; and a direction of unusual length scaled by a power of two, which is exact, because it
-   replaces components below 1e-18 by others. */
+/* False when the ray cannot be traced. Embree gets a slightly wider range than asked for, because the filter
+   decides in double; and a direction of unusual length scaled by a power of two, which is exact, because
+   Embree replaces components below 1e-18 by others. */
 static bool prepare(const mesh_tree *tree, const float origin[3], const float dir[3], float t_max, search *s,
                     struct RTCRay *ray)
 {

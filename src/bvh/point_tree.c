@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/point_tree.c -- Embree's builder over the boxes of balls, its nodes laid out for our walks. */
+/* bvh/point_tree.c -- builds the 8-wide tree over balls (point_tree.h has the data flow).
+
+     positions --> frame in which float32 keeps their digits --> boxes --> binary tree (binary_tree.c)
+         --> [widen] nodes of 8 children, depth first --> [fill_leaves] points in the order of the leaves
+         --> [fill_nodes] boxes, radii and least indices in double, from the last node to the root */
 #include "bvh/point_tree.h"
 
 #include <stdatomic.h>
@@ -24,8 +28,7 @@ typedef struct leaf_place {
 typedef struct builder {
     number_array position, radius;
     size_t count;
-    double origin[3],
-        scale; /* what Embree sees: (position - origin) scale, about 1 at most but for outliers */
+    double origin[3], scale; /* what Embree sees: (position - origin) scale, mostly within about 1 */
     struct RTCBuildPrimitive *boxes;
     atomic_size_t bad;
     binary_tree binary;
@@ -79,8 +82,9 @@ static gbt_status check_points(builder *b, gbt_error *err)
                      number_at(b->radius, i));
 }
 
-/* Outliers must not cost the others their digits in Embree's float32: the origin is the median, and the
-   quartiles are at about 1. Of a sample; boxes in double make the answers right whatever Embree sees. */
+/* Finds the frame of Embree's float32 boxes, such that outliers do not cost the other points their digits:
+   the origin is the median, and the quartiles are at about 1, both of a sample. Answers are right whatever
+   Embree sees, because the tree gets boxes in double. */
 static gbt_status find_frame(builder *b, gbt_error *err)
 {
     const size_t step = 1 + (b->count - 1) / MEDIAN_SAMPLES, samples = (b->count - 1) / step + 1;
@@ -158,7 +162,7 @@ static void place_leaf(builder *b, uint64_t child, point_node *node, int lane)
     b->filled_points += members->count;
 }
 
-/* The wide node for a binary one. Depth first, so that neighbours lie side by side. */
+/* The wide node in place of a binary one. Depth first, so that neighbours lie side by side. */
 static uint32_t widen(builder *b, const binary_node *root, int depth)
 {
     struct RTCBounds bounds[POINT_WIDTH];
@@ -244,7 +248,7 @@ static lane_sum sum_node(const point_node *node)
     return s;
 }
 
-/* Children stand behind their parents, so the last node comes first. */
+/* From the last node to the first, because children come after their parents. */
 static void fill_nodes(point_tree *t)
 {
     for (size_t at = t->node_count; at-- > 0;) {
@@ -282,7 +286,7 @@ static gbt_status run_builder(builder *b, RTCBVH bvh, gbt_error *err)
     b->err = err;
     if (b->binary.node_count > 0) {
         widen(b, (const binary_node *)(uintptr_t)b->binary.root, 1);
-    } else { /* one leaf; the node above it is ours */
+    } else { /* a single leaf: put a node above it */
         const uint32_t at = add_node(b);
         if (b->status == GBT_OK) {
             t->nodes[at].child_count = 1;
@@ -302,7 +306,7 @@ static gbt_status run_builder(builder *b, RTCBVH bvh, gbt_error *err)
 static gbt_status fill(builder *b, gbt_error *err)
 {
     point_tree *t = b->tree;
-    /* Every lane of 8 may be read: at the last place 7 beyond the end. */
+    /* Leaves are read 8 lanes at a time: the last one up to 7 beyond the end. */
     t->coordinate = mem_calloc(3 * b->count + POINT_WIDTH, sizeof *t->coordinate, "points.coordinate", err);
     t->index = mem_alloc(b->count, sizeof *t->index, "points.index", err);
     if (!number_none(b->radius))

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/point_tree.h -- inside of a point_tree (bvh/points.h), for the files that build it and those that ask
-   it.
+/* bvh/point_tree.h -- the inside of a point_tree (bvh/points.h), for the files that build it and those that
+   query it.
 
-   position --> [boxes in float32] --> Embree's builder --> binary tree     point_tree.c
-                                                               |  opened to 8 children, boxes in double
-                                                               v
-       answers <-- [walk, nearest first or all that touch] <-- nodes, and points in the order of the leaves
-                    points_nearest.c, points_list.c; many queries: points_batch.c
+     position --> [boxes in float32] --> Embree's builder --> binary tree     point_tree.c
+                                                                 |  opened to 8 children, boxes in double
+                                                                 v
+         answers <-- [walk, nearest first or all that touch] <-- nodes, and points in the order of the leaves
+                      points_nearest.c, points_list.c; many queries: points_batch.c
 
    Box and point are compared with the query by the same expression in double. Subtraction, squares and sums
    are monotone under rounding, so the squared distance of a box is never above that of a point in it: walks
-   need no margins, and lose nothing. Rays alone have one (points_list.c). */
+   need no margins, and miss nothing. Only rays need a margin (points_list.c). */
 #ifndef GBT_BVH_POINT_TREE_H
 #define GBT_BVH_POINT_TREE_H
 
@@ -20,7 +20,7 @@
 
 enum { POINT_WIDTH = 8, POINT_DEPTH_MAX = 512, POINT_STACK = POINT_DEPTH_MAX * (POINT_WIDTH - 1) + 1 };
 
-/* Eight lines of a cache. Lanes from child_count on repeat the first. */
+/* Eight cache lines. Lanes from child_count on repeat the first. */
 typedef struct point_node {
     _Alignas(64) double lower[3][POINT_WIDTH], upper[3][POINT_WIDTH]; /* of the centres */
     float radius[POINT_WIDTH];         /* the largest of the child's balls, rounded up */
@@ -34,14 +34,14 @@ struct point_tree {
     size_t count, node_count;
     point_node *nodes; /* the root first, children behind their parents */
     /* By place, the order of the leaves. A leaf of m points from place p on has its x, its y and its z, m of
-       each, from coordinate[3 p] on. Behind the end there is room to read on for a lane of 8. */
+       each, from coordinate[3 p] on. Eight more may be read behind the end. */
     double *coordinate;
     double *radius;                   /* NULL for points */
     uint32_t *index;                  /* of the point as it was given */
     double lower[3], upper[3], reach; /* of the centres; the largest |coordinate| of any ball */
 };
 
-/** Squared distances to eight boxes, of any node. */
+/** Squared distances to the eight boxes of a node. */
 static inline __attribute__((always_inline)) void boxes_distance(const point_node *node, const double q[3],
                                                                  double out[POINT_WIDTH])
 {
@@ -56,7 +56,7 @@ static inline __attribute__((always_inline)) void boxes_distance(const point_nod
     }
 }
 
-/** Squared distances to the points of a leaf; of what is behind its end anything. */
+/** Squared distances to the points of a leaf; lanes from `size` on hold anything. */
 static inline __attribute__((always_inline)) void points_distance(const point_tree *tree, uint32_t place,
                                                                   size_t size, const double q[3],
                                                                   double out[POINT_WIDTH])
@@ -76,7 +76,7 @@ static inline bool usable3(const double v[3])
 /** GBT_OK, or what is wrong with a query. */
 gbt_status point_query_check(const point_query *query, gbt_error *err);
 
-/** Ascending by the high 32 bits, of which `bits` are used; equal ones stay in order. `spare` [count]. */
+/** Sorts by the upper 32 bits, of which the lowest `bits` are used; stable. `spare` [count]. */
 void point_sort(uint64_t *item, uint64_t *spare, size_t count, int bits);
 
 #endif

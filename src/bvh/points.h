@@ -4,8 +4,8 @@
    crosses; one by one, or in batches.
 
    All answers are those of double arithmetic on the coordinates given, as a test of every ball would find
-   them, and ties are ordered by index. Any coordinates and radii up to POINT_LIMIT will do, however small or
-   far from the origin, and any number of coincident points. */
+   them, and ties are ordered by index. Coordinates and radii may be anything up to POINT_LIMIT, however small
+   or far from the origin, and any number of points may coincide. */
 #ifndef GBT_BVH_POINTS_H
 #define GBT_BVH_POINTS_H
 
@@ -77,7 +77,7 @@ static inline uint32_t point_list_index(const point_list *list, size_t i)
 {
     return (uint32_t)(list->item[i] >> 32);
 }
-/** |c - a|^2; of POINTS_CROSSED the t of the point of the segment that is nearest to c. */
+/** |c - a|^2; for POINTS_CROSSED the t of the point of the segment that is nearest to c. */
 static inline double point_list_value(const point_list *list, size_t i)
 {
     return list->value[(uint32_t)list->item[i]];
@@ -147,8 +147,8 @@ typedef struct point_lists {
     size_t count;
     size_t *first; /* [count + 1] */
     uint32_t *index;
-    double *value; /* of each answer: |c - a|; of POINTS_CROSSED the t of the point that is nearest to c. NULL
-                      when not wanted */
+    double *value; /* of each answer: |c - a|; for POINTS_CROSSED the t of the point that is nearest to c.
+                      NULL when not wanted */
 } point_lists;
 void point_lists_free(point_lists *lists);
 
@@ -166,7 +166,7 @@ gbt_status point_tree_list_all(const point_tree *tree, const point_queries *quer
  * For every point: root of the mean of the squared distances to its k nearest others (fewer when there are
  * fewer; 0 for a lone point).
  *
- * @param position [in] [count][3], as the tree was built of
+ * @param position [in] [count][3], those that the tree was built from
  * @param k        [in] 1..64, else GBT_ERR_ARGUMENT
  * @param spacing  [out] [count]
  *

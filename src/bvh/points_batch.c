@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/points_batch.c -- many queries at once: in blocks on all threads, and within a block in the order in
-   which they lie in space, so that one finds in the caches what the one before has read. */
+/* bvh/points_batch.c -- many queries at once: blocks of queries on all threads, and within a block in Morton
+   order, so that a query finds in the caches what the one before has read. */
 #include <stdatomic.h>
 #include <string.h>
 
@@ -20,7 +20,7 @@ enum {
     CHECK_QUERIES = 1024
 };
 
-/* A function of the number of queries alone. */
+/* Depends on the number of queries alone, so that blocks do not depend on the threads. */
 static size_t grain_of(size_t count)
 {
     const size_t grain = count / BLOCKS_WANTED;
@@ -29,7 +29,7 @@ static size_t grain_of(size_t count)
 
 /* ---- the order in space ---- */
 
-/* Morton code of a point among the cells of a grid over the centres; what is not a number is in cell 0. */
+/* Morton code of a point in a grid over the centres; a coordinate that is NaN is in cell 0. */
 static uint32_t code_of(const point_tree *tree, const double p[3])
 {
     uint32_t code = 0;
@@ -43,7 +43,8 @@ static uint32_t code_of(const point_tree *tree, const double p[3])
     return code;
 }
 
-/* Numbers of the queries [begin, end), less `begin`, in the low halves. NULL without memory. */
+/* The queries [begin, end) in Morton order: their numbers, less `begin`, in the lower halves. NULL when
+   memory ran out. */
 static uint64_t *order_of(const point_tree *tree, number_array query, size_t begin, size_t end,
                           gbt_error *err)
 {
@@ -60,7 +61,7 @@ static uint64_t *order_of(const point_tree *tree, number_array query, size_t beg
     return order;
 }
 
-/* ---- failures: of the first query that has one ---- */
+/* ---- failures: that of the first bad query is reported ---- */
 
 typedef struct block_failure {
     gbt_error error;
@@ -270,7 +271,7 @@ static void list_block(size_t block, size_t begin, size_t end, void *context)
         const point_query q = query_at(job->queries, i);
         gbt_error why = {0};
         const gbt_status status = point_tree_list(job->tree, &q, &list, &why);
-        if (status == GBT_ERR_ARGUMENT) { /* of several the first query's counts */
+        if (status == GBT_ERR_ARGUMENT) { /* the failure of the first query counts */
             if (i < b->failure.query)
                 b->failure = (block_failure){why, i};
             continue;

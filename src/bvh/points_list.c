@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/points_list.c -- queries whose answer is a list: balls within, containing, overlapping, crossed. */
+/* bvh/points_list.c -- queries whose answer is a list: balls within, containing, overlapping, crossed.
+
+   One walk with a stack: nodes whose boxes (grown by the largest radius in them) may hold an answer are
+   pushed, the balls of leaves are tested eight at a time; then the answers are sorted by index. */
 #include <string.h>
 
 #include "base/clones.h"
@@ -38,7 +41,7 @@ gbt_status point_query_check(const point_query *q, gbt_error *err)
     return GBT_OK;
 }
 
-/* Squared distance from x, y, z to the segment: at t = (m . dir) / (dir . dir), m = c - origin, held to
+/* Squared distance of (x, y, z) to the segment: at t = (m . dir) / (dir . dir), m = c - origin, clamped to
    [t_min, t_max]. */
 static inline __attribute__((always_inline)) double segment_distance(const point_query *q, double x, double y,
                                                                      double z, double *where)
@@ -59,13 +62,13 @@ typedef struct search {
     const point_tree *tree;
     const point_query *query;
     double radius; /* added to that of every ball */
-    bool balls;    /* the balls' radii count */
-    double pad;    /* of boxes against rays */
+    bool balls;    /* the radii of the balls count */
+    double pad;    /* added to boxes that are tested against rays */
     double inverse[3];
     point_list *out;
 } search;
 
-/* Which children of a node may hold an answer, and which points of a leaf are one: > 0. */
+/* Children of a node that may hold an answer (node_touches) and points of a leaf that are one: out > 0. */
 static inline __attribute__((always_inline)) void node_touches(const search *s, const point_node *node,
                                                                double out[POINT_WIDTH])
 {
@@ -96,7 +99,7 @@ static inline __attribute__((always_inline)) void leaf_answers(const search *s, 
             out[i] = d2[i] <= s->radius * s->radius ? 1 : 0;
 }
 
-/* Boxes of centres, grown by the largest radius and the pad, against the part of the segment that is left. */
+/* Tests the boxes of centres, grown by the largest radius and the pad, against the segment, by slabs. */
 static inline __attribute__((always_inline)) void node_crossed(const search *s, const point_node *node,
                                                                double out[POINT_WIDTH])
 {
@@ -268,7 +271,7 @@ gbt_status point_tree_list(const point_tree *tree, const point_query *query, poi
         s.inverse[j] = 1 / query->b[j];
         far = fmax(far, fabs(query->a[j]));
     }
-    /* Some 2^-48 of it can be lost in the slab test and in the distance to the segment. */
+    /* The slab test and the distance to the segment can lose about 2^-48 of the largest coordinate. */
     s.pad = 0x1p-44 * far;
     gbt_status status = ray ? walk_along(&s, err) : walk_around(&s, err);
     if (status == GBT_OK && out->count > 1)

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bvh/points_nearest.c -- the nearest centres of one query. */
+/* bvh/points_nearest.c -- the k nearest centres of one query.
+
+   Depth first, with a stack of opened nodes: the children of each are visited nearest first, and those that
+   are farther than the k-th best so far are skipped. Ties are decided by index. */
 #include "base/clones.h"
 #include "bvh/point_tree.h"
 
@@ -7,7 +10,7 @@ typedef struct nearest_search {
     size_t k, skip, found;
     uint32_t *index;          /* [k], ordered by (distance, index) */
     double *distance_squared; /* [k] */
-    double worst;             /* of k that are known; infinite before */
+    double worst;             /* squared distance of the k-th best; infinite while there are fewer */
     uint32_t worst_index;
 } nearest_search;
 
@@ -36,8 +39,8 @@ typedef struct opened {
     const point_node *node;
     size_t next;                   /* the next key */
     double d2[POINT_WIDTH];        /* of the lanes */
-    uint64_t key[POINT_WIDTH + 1]; /* ascending: the bits of d2, which are in the order of the numbers, and in
-                                      the last three of them the lane; then what is above all */
+    uint64_t key[POINT_WIDTH + 1]; /* ascending: the bits of d2, which are in the order of the numbers, with
+                                      the lane in the last three; then a sentinel above all */
 } opened;
 
 static const uint64_t LANE_BITS = POINT_WIDTH - 1;
@@ -51,7 +54,7 @@ static inline uint64_t bits_of(double x)
     return both.bits;
 }
 
-/* The place of each key is how many are below it: no branches to be guessed. */
+/* The place of a key is the number of smaller ones, so that there is no branch to mispredict. */
 static inline __attribute__((always_inline)) void open_node(const point_node *node, const double q[3],
                                                             opened *o)
 {
@@ -77,7 +80,7 @@ FASTEST_CLONE static void walk(const point_tree *tree, const double query[3], ne
     open_node(tree->nodes, q, top);
     for (;;) {
         const uint64_t key = top->key[top->next];
-        if ((key & ~LANE_BITS) > bits_of(s->worst)) { /* so are the others of this node */
+        if ((key & ~LANE_BITS) > bits_of(s->worst)) { /* the other children of this node are farther, too */
             if (top == stack)
                 return;
             top--;

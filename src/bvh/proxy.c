@@ -72,8 +72,8 @@ static void box_block(size_t block, size_t begin, size_t end, void *context)
             kept++;
             continue;
         }
-        /* 1e-5 of the half extent covers the rounding of k and of the rotation; the pad covers that of the
-           coordinates. */
+        /* 1e-5 of the half extent covers the rounding of k and of the rotation; the pad covers the rounding
+           of coordinates. */
         struct RTCBuildPrimitive *p = &out[kept++];
         p->lower_x = center[0] - half[0] * 1.00001f - job->pad;
         p->upper_x = center[0] + half[0] * 1.00001f + job->pad;

@@ -18,8 +18,8 @@ typedef struct proxy_boxes {
                                       geomID is 0 */
     size_t count;                  /* Gaussians with opacity <= alpha_min or non-finite fields have no box */
     size_t rejected_count;         /* of these, the non-finite or out-of-range ones */
-    size_t capacity;               /* a quarter more than count at least: Embree's builders want room */
-    float coordinate_max;          /* largest |coordinate| of any box before padding */
+    size_t capacity;      /* at least a quarter more than count: working space of Embree's builders */
+    float coordinate_max; /* largest |coordinate| of any box before padding */
 } proxy_boxes;
 
 /**

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cells/draw.c -- the cells of a view, front to back.
 
-   node of the tree --> nothing of the share in it, or no ray sees anything in it: done
-        --> it fits: load, trace the intervals of the rays, blend
-        --> else its children, the one with the eye first */
+     node of the store's tree --> no chunk of the share is in it, or no ray has an interval in it: done
+          --> its Gaussians fit in the budget: load, trace the intervals of the rays, blend
+          --> else its children, the one with the eye first */
 #include "cells/draw.h"
 
 #include <string.h>
@@ -20,7 +20,8 @@ typedef struct picture {
     image *out;
 } picture;
 
-/* What the cell adds, and what it leaves for those behind it. */
+/* Adds the colours of the cell to the picture; its transmittance is what rays have in front of the next
+   cells. */
 static void add_cell(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/load.c -- the Gaussians that a view may see of a part of space: read, coloured, widened, and kept
-   where they reach into it; then in the order of the .ply. */
+/* cells/load.c -- the Gaussians that a view may see in a part of space.
+
+     chunks in view that reach into the part --> rows, ROWS_TOGETHER at a time --> unpacked
+         --> those in view, coloured and widened (trace/footprint.h)
+         --> those that reach into the part are kept, until the budget is exceeded
+     kept rows --> radix sort by their number in the .ply, the order in which all of them would be traced */
 #include <math.h>
 #include <string.h>
 
@@ -38,8 +42,8 @@ static void unpack_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* How far a Gaussian reaches along each axis where its response counts, and a little more: depths in float
-   have errors, and so have the places of hits. False for what is never hit. */
+/* How far a Gaussian reaches along each axis while its response counts, and a little farther, because depths
+   in float, and so the places of hits, have errors. False for one that is never hit. */
 static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, float half[3], float *radius)
 {
     const float share = g->opacity[i] / d->settings.alpha_min;
@@ -58,7 +62,7 @@ static bool find_extent(const cell_drawer *d, const gaussians *g, size_t i, floa
     return true;
 }
 
-/* Tiles that a ball of the Gaussian's reach covers, about and rather more. */
+/* An estimate, rather too large, of how many tiles a ball of the Gaussian's reach covers. */
 static double count_tiles(const cell_drawer *d, const float mean[3], float radius)
 {
     const double tiles =
@@ -70,7 +74,7 @@ static double count_tiles(const cell_drawer *d, const float mean[3], float radiu
         along += to[k] * d->view.axis[k];
     }
     const double distance = sqrt(square) - (double)radius;
-    /* Off the axis of a perspective picture things are larger. */
+    /* Off the axis of a perspective picture things appear larger. */
     const double depth =
         d->view.kind == FOOTPRINT_PERSPECTIVE ? along * along / sqrt(square) - (double)radius : distance;
     if (!(depth > 0) || !(distance > 0))
@@ -92,7 +96,7 @@ static bool reaches_into(const cell_drawer *d, const cell_part *part, const floa
     return true;
 }
 
-/* Those of the piece that reach into the part. @return false when they are too many */
+/* Keeps the rows of the piece that reach into the part. @return false when they are too many */
 static bool keep_rows(cell_drawer *d, const cell_part *part, const gaussians *g)
 {
     cell_load *load = &d->load;
@@ -194,7 +198,7 @@ static gbt_status reserve(cell_drawer *d, gbt_error *err)
     }
     if (load->capacity == capacity)
         return GBT_OK;
-    /* As many as the budget can hold; what is not used is no memory. */
+    /* Room for as many as the budget can hold: pages that are not used take no memory. */
     load->capacity = 0;
     mem_free(load->rows);
     load->rows = mem_alloc(capacity, CELL_LOAD_FLOATS * sizeof *load->rows, "rows of a cell", err);
@@ -210,7 +214,7 @@ static gbt_status reserve(cell_drawer *d, gbt_error *err)
 
 /* ---- order ---- */
 
-/* By the upper halves, which differ. */
+/* Radix sort by the upper halves, which are all different. */
 static const uint64_t *sort_numbers(uint64_t *from, uint64_t *to, size_t count)
 {
     enum { PLACES = 1 << SORT_BITS };
@@ -254,7 +258,7 @@ static void place_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* So many that reading them to see what is visible is not worth it. */
+/* Whether there are so many rows that it is not worth reading them to see which are visible. */
 static bool is_far_too_much(const cell_drawer *d, const cell_part *part)
 {
     size_t rows = 0;

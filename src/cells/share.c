@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/share.c -- a picture in shares: each a run of cells, front to back; how their layers are blended. */
+/* cells/share.c -- a picture in shares, each a run of cells from front to back: which chunks a share has, and
+   how the layers of the shares are blended. */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +15,8 @@ typedef struct share_walk {
     size_t before, total; /* of the weights */
 } share_walk;
 
-/* Chunks from the eye on: one belongs to the share in which the Gaussians in front of it end. */
+/* Visits the chunks from the eye on. A chunk belongs to the share whose part of the summed weights holds the
+   sum over the chunks in front of it. */
 static void walk_part(share_walk *w, const cell_part *part)
 {
     cell_drawer *d = w->d;
@@ -64,8 +66,9 @@ void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer)
     }
 }
 
-/* Behind the layer in which a ray ends nothing counts; in it the ray ends later than where it would have
-   ended with what those in front have left, unless they have left all. */
+/* Behind the layer in which a ray ends nothing counts. Unless the layers in front have left all of the ray,
+   it ends earlier in this layer than it did when the layer was drawn alone: the layer is then left out here,
+   and drawn again. */
 void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
                        float *sum, float *enter)
 {

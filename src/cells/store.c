@@ -21,7 +21,7 @@ enum {
     BLOCK = 2048, /* rows that are read together */
     BATCH = 16,   /* blocks in memory */
     SAMPLE_BLOCKS = 128,
-    SAMPLE_ROWS = 1024, /* of each of them */
+    SAMPLE_ROWS = 1024, /* of each of these blocks */
     CHUNKS_MOST = 8192,
     CHUNK_ROWS = 16384,
     EXTENT_BYTES = 65536
@@ -98,7 +98,7 @@ static gbt_status reserve_blocks(sorting *s, gbt_error *err)
 
 /* ---- the tree ---- */
 
-/* Means of rows all over the file. */
+/* A sample of the means: runs of rows all over the file. */
 static gbt_status take_sample(sorting *s, gbt_error *err)
 {
     const size_t count = s->ply.count, wanted = (size_t)SAMPLE_BLOCKS * SAMPLE_ROWS;
@@ -115,7 +115,7 @@ static gbt_status take_sample(sorting *s, gbt_error *err)
         memcpy(s->sample + 3 * s->sample_count, b->cloud.mean, 3 * b->cloud.count * sizeof *s->sample);
         s->sample_count += b->cloud.count;
     }
-    b->cloud.dropped = b->cloud.identity_rotations = b->cloud.scales_clamped = 0; /* they come again */
+    b->cloud.dropped = b->cloud.identity_rotations = b->cloud.scales_clamped = 0; /* they are counted later */
     return GBT_OK;
 }
 
@@ -129,7 +129,7 @@ static int by_z(const void *a, const void *b)
     return compare_floats((const float *)a + 2, (const float *)b + 2);
 }
 
-/* Along the widest axis, in the middle of the sample. */
+/* Cuts a node, and those below it, along the widest axis of its sample, at the median. */
 static void cut_node(cell_store *store, size_t node, float *sample, size_t count)
 {
     static int (*const by[3])(const void *, const void *) = {by_x, by_y, by_z};
@@ -190,7 +190,7 @@ static gbt_status plan(sorting *s, size_t memory, size_t chunk_rows, gbt_error *
     return GBT_OK;
 }
 
-/* ---- into the file ---- */
+/* ---- into the temporary file ---- */
 
 static gbt_status flush(sorting *s, size_t chunk, gbt_error *err)
 {
@@ -203,7 +203,7 @@ static gbt_status flush(sorting *s, size_t chunk, gbt_error *err)
                         store->extent_count + 1, sizeof *store->extents, "extents of Gaussians", err));
     const uint32_t number = (uint32_t)store->extent_count++;
     store->extents[number] = (cell_extent){.at = store->rows.size, .count = count};
-    if (c->count == count) /* all of it so far */
+    if (c->count == count) /* this is the first extent of the chunk */
         c->first_extent = number;
     else
         store->extents[c->last_extent].next = number;
@@ -251,7 +251,7 @@ static gbt_status add_batch(sorting *s, size_t rows, gbt_error *err)
     return GBT_OK;
 }
 
-/* As loaded_run_take_cloud(): coordinates are around the middle of the means. */
+/* Makes coordinates relative to the middle of the means, as loaded_run_take_cloud() does. */
 static void make_local(sorting *s)
 {
     cell_store *store = s->store;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/store.h -- a plain .ply in the order of space: its Gaussians in a temporary file, in the chunks that
-   are the leaves of a k-d tree over their means. One pass over the .ply, in bounded memory. */
+/* cells/store.h -- the Gaussians of a plain .ply in a temporary file, sorted by place: chunks of rows, which
+   are the leaves of a k-d tree over the means. One pass over the .ply, in bounded memory. */
 #ifndef GBT_CELLS_STORE_H
 #define GBT_CELLS_STORE_H
 
@@ -21,7 +21,7 @@ enum {
     CELL_ROW_SH
 };
 
-/** A leaf of the tree. Its Gaussians reach out of its part of space: see `sigma`. */
+/** A leaf of the tree. Its Gaussians reach out of its box: see `sigma`. */
 typedef struct cell_chunk {
     size_t count;
     float low[3], high[3];              /* of the means, local */
@@ -29,10 +29,10 @@ typedef struct cell_chunk {
     uint32_t first_extent, last_extent; /* valid when count > 0 */
 } cell_chunk;
 
-/** Rows of one chunk that stand together in the file, in the order of the .ply. */
+/** Consecutive rows of one chunk in the file, in the order of the .ply. */
 typedef struct cell_extent {
     uint64_t at;
-    uint32_t count, next; /* next: of the same chunk; not set in its last */
+    uint32_t count, next; /* next: next extent of the same chunk; not set in the last */
 } cell_extent;
 
 /** Node i of the tree is cut at `at` along `axis` (local coordinates); its children are nodes 2 i + 1 (below)
@@ -55,7 +55,8 @@ typedef struct cell_store {
     size_t extent_count, extent_capacity;
     size_t row_floats;
     large_file rows;
-    double middle[3]; /* of the means, as they are in the file: local ones are around it */
+    double middle[3]; /* middle of the means, in the coordinates of the file; local coordinates are relative
+                         to it */
 } cell_store;
 
 /**
@@ -63,7 +64,7 @@ typedef struct cell_store {
  *
  * @param folder     [in]  where the temporary file is made: as large as the .ply, gone with the store
  * @param memory     [in]  bytes that this may take, some 64 MB at least
- * @param chunk_rows [in]  about how many Gaussians a chunk has; 0: as many as suit
+ * @param chunk_rows [in]  about how many Gaussians a chunk has; 0: as suits
  * @param out        [out] start from {0}; free with cell_store_free() after success or failure
  * @return GBT_OK; as gaussian_ply_open(); GBT_ERR_FORMAT also when no Gaussian remains; GBT_ERR_IO;
  *         GBT_ERR_NO_MEMORY

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cells/together.c -- one picture by all processes of the cluster.
 
-   each: its share of the cells --> a layer of all pixels
-        --> strip k of it goes to process k, which blends all layers there
-        --> rays that end by what is in front of a share: drawn in it again, added
-        --> everybody gets all strips */
+     each process: its share of the cells --> a layer of all pixels
+          --> strip k of it goes to process k, which blends the strips of all layers
+          --> rays that end in a share because of what is in front of it: drawn in it again, added
+          --> all processes get all strips */
 #include "base/memory.h"
 #include "cells/view.h"
 #include "cluster/cluster.h"
@@ -18,7 +18,7 @@ typedef struct strips {
     float *sum;          /* [mine][CELL_LAYER_FLOATS]; then [mine][3] */
     float *enter;        /* [size][mine] */
     float *enter_own;    /* [pixels] of the own share */
-    size_t whole[CLUSTER_SIZE_MAX], part[CLUSTER_SIZE_MAX]; /* of each strip, of the own one */
+    size_t whole[CLUSTER_SIZE_MAX], part[CLUSTER_SIZE_MAX]; /* of each strip; of the own strip */
     const float *layer_of[CLUSTER_SIZE_MAX];
 } strips;
 

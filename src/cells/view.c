@@ -12,13 +12,13 @@
 
 enum { RAY_BLOCK = 4096 };
 
-/* What the program itself takes, the buffers of threads and of files. */
+/* What the program itself takes, with the buffers of threads and files; and the least for a cell. */
 static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)48 << 20;
 
-/* Of one cell: lists number records, and pairs of Gaussian and tile, in 32 bits. */
+/* Most for one cell: lists number records, and pairs of Gaussian and tile, in 32 bits. */
 static const size_t cell_bytes_most = (size_t)64 << 30;
 
-/* Directions and what the lens makes of the pixels, intervals, colours of the cell and in all, and the
+/* Per pixel: directions and those before the pose, intervals, colours of the cell and of the picture, and the
    picture as it is written; layers, where there are shares. */
 enum { PIXEL_BYTES = 120, PIXEL_LAYER_BYTES = 80 };
 
@@ -61,7 +61,8 @@ typedef struct cut_job {
     atomic_size_t seeing;
 } cut_job;
 
-/* Both sides of a cut find its depth by the same operations, so that their intervals touch. */
+/* The parts on both sides of a cut find the t of the cut by the same operations, so that their intervals
+   touch exactly. */
 static void cut_rays(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -131,7 +132,7 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
     return GBT_OK;
 }
 
-/* A chunk as one ball that reaches as far as its Gaussians do. */
+/* A ball that contains all that the Gaussians of a chunk reach. */
 static void chunk_ball(const cell_drawer *d, const cell_chunk *c, float center[3], float *scale_log)
 {
     float square = 0, sigma = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cells/view.h -- what the files of this room share: a view, a part of space, and how one is loaded. */
+/* cells/view.h -- what the files of this folder share: a view, a part of space, and how it is loaded. */
 #ifndef GBT_CELLS_VIEW_H
 #define GBT_CELLS_VIEW_H
 
@@ -7,11 +7,11 @@
 
 enum { CELL_DEPTH_MOST = 16, CELL_LOAD_FLOATS = GAUSSIANS_FIELD_COUNT };
 
-/* What a Gaussian of a cell takes, rows as read and sorted, records, those of the view; and a tile that it
-   reaches into. */
+/* Bytes for each Gaussian of a cell: rows as read and as sorted, records, those of the view; and for each
+   tile that it reaches into. */
 enum { CELL_BYTES_EACH = 340, CELL_BYTES_PAIR = 20 };
 
-/** A node of the store's tree: a box, and the cuts that lead to it. */
+/** A node of the store's tree: a box, and the cuts that lead to it from the root. */
 typedef struct cell_part {
     size_t node;
     float low[3], high[3]; /* may be infinite */
@@ -19,7 +19,7 @@ typedef struct cell_part {
     struct cell_way {
         int axis;
         float at;
-        bool below; /* it is the child below the cut */
+        bool below; /* the part lies below this cut */
     } way[CELL_DEPTH_MOST];
 } cell_part;
 
@@ -31,31 +31,32 @@ static inline bool cell_is_chunk(const cell_store *store, const cell_part *part)
     return part->node >= store->chunk_count - 1;
 }
 
-/** Rays, bounds, visible chunks and budgets of a shot; all rays whole. */
+/** Finds rays, bounds, visible chunks and the budget of a shot; every ray has its whole length. */
 gbt_status cell_view_start(cell_drawer *d, const ray_shot *shot, gbt_error *err);
 
-/** The run of chunks that is the drawer's share of this view. */
+/** Finds the run of chunks that is the drawer's share of this view. */
 gbt_status cell_share_find(cell_drawer *d, gbt_error *err);
 
-/** Floats of a pixel of a layer, the picture of one share: colour, and the transmittance behind it, below 0
+/** Floats per pixel of a layer, the picture of one share: colour, and the transmittance behind it, negative
     where the ray has ended. */
 enum { CELL_LAYER_FLOATS = 4 };
 
-/** What has just been drawn, without a background, as a layer of [pixels][CELL_LAYER_FLOATS]. */
+/** Turns what has just been drawn, without a background, into a layer of [pixels][CELL_LAYER_FLOATS]. */
 void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer);
 
 /**
- * Layers one behind the other, the first one in front; each was drawn as if nothing were in front of it.
+ * Blend layers, the first one in front; each was drawn as if nothing were in front of it.
  *
  * @param sum   [out] [pixels][CELL_LAYER_FLOATS] colour, and the transmittance behind it
- * @param enter [out] [count][pixels] above 0: the ray ends in this layer, which is not in `sum`: draw it
- * again for rays that enter with this transmittance (cell_drawer.enter), then cell_layers_add()
+ * @param enter [out] [count][pixels] > 0: the ray ends in this layer, which is not in `sum`. Draw the layer
+ *                    again for rays that enter it with this transmittance (cell_drawer.enter), then call
+ *                    cell_layers_add()
  */
 void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
                        float *sum, float *enter);
 void cell_layers_add(const float *const again[], int count, size_t pixels, const float *enter, float *sum);
 
-/** Set the interval of every ray to what is in `part`. @return how many rays still see something there */
+/** Restrict every ray to its interval in `part`. @return how many rays have one */
 size_t cell_view_cut(cell_drawer *d, const cell_part *part);
 
 /**

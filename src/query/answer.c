@@ -46,7 +46,7 @@ static gbt_status read_queries(const gbt_query_def *def, query_rows *rows, gbt_e
     return GBT_OK;
 }
 
-/* Numbers `from` to `from` + `width` of each row, side by side. NULL without memory. */
+/* Columns `from` .. `from` + `width` - 1 of all rows, [count][width]. NULL when memory ran out. */
 static double *take(const query_rows *rows, size_t from, size_t width, gbt_error *err)
 {
     double *out = mem_alloc(rows->count, width * sizeof *out, "queries", err);

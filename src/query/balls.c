@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* query/balls.c -- what is asked of balls. */
+/* query/balls.c -- the queries of gbt_balls: nearest, within, containing, overlapping, crossed. */
 #include <math.h>
 
 #include "base/fail.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* query/handle.h -- what is behind gbt_balls. */
+/* query/handle.h -- the struct behind the handle gbt_balls. */
 #ifndef GBT_QUERY_HANDLE_H
 #define GBT_QUERY_HANDLE_H
 

@@ -14,10 +14,11 @@
 #include "query/rows.h"
 #include "run/loaded_run.h"
 
-/* Std-devs to where a response of this opacity falls to 1/255, as rays cut it; 0 where it never is. */
+/* How many std-devs away a response of this opacity falls to 1/255, where the tracer cuts it off; 0 if it
+   never reaches that. */
 static double reach_of(double opacity) { return opacity * 255 > 1 ? sqrt(2 * log(opacity * 255)) : 0; }
 
-/* exp as the decoder takes it. */
+/* exp with the decoder's limit. */
 static double scale_of(float scale_log) { return exp(fmax((double)scale_log, -(double)ACTIVATION_LIMIT)); }
 
 static gbt_status make_room(gbt_balls *b, size_t count, bool radii, gbt_error *err)

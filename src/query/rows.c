@@ -27,7 +27,7 @@ static gbt_status add_row(query_rows *rows, const double *values, gbt_error *err
 
 /* ---- text ---- */
 
-/* Numbers of a line; false when one is none, or missing between commas. */
+/* The numbers of a line; false when something is not a number, or one is missing between commas. */
 static bool read_line(const char *at, const char *end, double value[ROW_WIDTH_MAX + 1], size_t *count)
 {
     bool missing = true; /* no number since the last comma, or the begin of the line */

@@ -33,10 +33,10 @@ typedef struct binary_tree {
 } binary_tree;
 
 /**
- * Over at least one box. The same tree for any number of threads.
+ * Build a binary tree over at least one box: the same for any number of threads.
  *
  * @param boxes    [in, out] [capacity], sorted by Embree; those above count are its working space
- * @param leaf_max [in] boxes of a leaf at most; a leaf costs the same, whether it holds 1 or as many
+ * @param leaf_max [in] most boxes of a leaf; to the SAH a leaf with one box costs as much as a full one
  * @param what     [in] what errors begin with
  * @return GBT_OK, GBT_ERR_NO_MEMORY (also beyond bvh_limit_memory()) or GBT_ERR_INTERNAL
  */

@@ -18,8 +18,8 @@
  *
  * It uses the instruction sets of cpu_best_isa() at most. Embree's builders run on oneTBB, so
  * parallel_set_threads() limits them too, whenever it is called; with GBT_PTHREADS they use every processor.
- * Embree runs its builders, and the callbacks in them, in a floating-point mode that takes numbers below
- * 1.2e-38 for 0.
+ * Embree runs its builders, and the callbacks in them, in a floating-point mode that flushes denormals
+ * (below 1.2e-38) to 0.
  *
  * @return NULL with GBT_ERR_NO_MEMORY or GBT_ERR_INTERNAL in `err` when Embree cannot start; it is not tried
  *         again
@@ -68,9 +68,9 @@ static inline bool bvh_ray_ok(const float origin[3], const float dir[3], float t
 }
 
 /**
- * The exponent of a power of two: a direction divided by it, which is exact, can go to Embree, which replaces
- * components below 1e-18 by others; t is multiplied by it. 0 for directions of usual length, and for those
- * that are not finite.
+ * The exponent of the power of two by which a direction is divided (exactly) and t is multiplied before they
+ * go to Embree, which replaces components of directions below 1e-18 by others. 0 for directions of usual
+ * length, and for those that are not finite.
  */
 static inline int bvh_ray_exponent(const float dir[3])
 {
@@ -82,8 +82,8 @@ static inline int bvh_ray_exponent(const float dir[3])
 }
 
 /**
- * How far the faces of a box must move out so that Embree's float32 slab test misses no ray, beside one
- * nextafterf().
+ * How far the faces of a box must move out so that Embree's float32 slab test misses no ray, in addition to
+ * one nextafterf().
  *
  * Embree tests boxes of user geometry without any margin, whatever RTC_SCENE_FLAG_ROBUST says. A quarter of
  * this removed every miss of 1.03 M rays at five scales. `reach`: largest |coordinate| of the boxes and of

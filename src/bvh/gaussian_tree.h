@@ -2,9 +2,9 @@
 /* bvh/gaussian_tree.h -- a 16-wide tree over the ellipsoid proxies of Gaussians, made by Embree's builder
    (Wald 2014).
 
-   The proxy of Gaussian i is the ellipsoid at k = sqrt(2 ln(opacity / alpha_min)) std-devs: the set where
-   its response reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h);
-   leaves hold up to 16 of the ellipsoids themselves, k^2 1e-4 larger for rounding.
+   The proxy of Gaussian i is the ellipsoid at k = sqrt(2 ln(opacity / alpha_min)) std-devs: the set where its
+   response reaches alpha_min. Inner nodes hold the padded tight boxes of these ellipsoids (proxy.h); leaves
+   hold up to 16 of the ellipsoids themselves, with k^2 enlarged by 1e-4 for rounding.
 
    Both are laid out for kernels that test 16 children at once, so their layout is part of the interface. */
 #ifndef GBT_BVH_GAUSSIAN_TREE_H

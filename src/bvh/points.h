@@ -54,8 +54,7 @@ void point_tree_free(point_tree *tree); /* NULL is fine */
 /* ---- one by one ---- */
 
 /**
- * Up to k nearest centres, nearest first, ties by index; `skip` is left out by index (pass SIZE_MAX for
- * none).
+ * Up to k nearest centres, nearest first, ties by index; ball `skip` is left out (SIZE_MAX: none).
  *
  * @param index            [out] [k]
  * @param distance_squared [out] [k], double
@@ -68,7 +67,7 @@ size_t point_tree_nearest(const point_tree *tree, const double query[3], size_t 
 
 /** A growing list of answers, by index; start from {0}, free with point_list_free(). */
 typedef struct point_list {
-    uint64_t *item; /* the index of a ball, and below its 32 bits where its value is */
+    uint64_t *item; /* index of the ball << 32 | place of its value */
     double *value;
     size_t count, capacity, value_capacity;
 } point_list;
@@ -110,7 +109,7 @@ gbt_status point_tree_list(const point_tree *tree, const point_query *query, poi
 /* ---- in batches: parallel inside, the same answers for every number of threads ---- */
 
 /**
- * point_tree_nearest() for many queries, which are worked on in the order in which they lie in space.
+ * point_tree_nearest() for many queries, which are worked on in Morton order.
  *
  * @param query     [in] [count][3]
  * @param skip_same [in] query i leaves ball i out: the queries are the balls' own centres

@@ -18,8 +18,8 @@ static const size_t base_bytes = (size_t)128 << 20, cell_bytes_least = (size_t)4
 /* Most for one cell: lists number records, and pairs of Gaussian and tile, in 32 bits. */
 static const size_t cell_bytes_most = (size_t)64 << 30;
 
-/* Per pixel: directions and those before the pose, intervals, colours of the cell and of the picture, and the
-   picture as it is written; layers, where there are shares. */
+/* Per pixel: directions in world and in camera axes, intervals, colours of the cell and of the picture, and
+   the picture as it is written; layers, where there are shares. */
 enum { PIXEL_BYTES = 120, PIXEL_LAYER_BYTES = 80 };
 
 size_t cell_memory_whole(size_t count, uint64_t file_bytes)

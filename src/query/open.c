@@ -18,7 +18,7 @@
    never reaches that. */
 static double reach_of(double opacity) { return opacity * 255 > 1 ? sqrt(2 * log(opacity * 255)) : 0; }
 
-/* exp with the decoder's limit. */
+/* exp of a scale_log, which is limited from below as the decoder does it. */
 static double scale_of(float scale_log) { return exp(fmax((double)scale_log, -(double)ACTIVATION_LIMIT)); }
 
 static gbt_status make_room(gbt_balls *b, size_t count, bool radii, gbt_error *err)

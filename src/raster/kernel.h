@@ -59,10 +59,10 @@ typedef struct ray_splat {
 /* A splat in the list of a tile. */
 typedef struct tile_entry {
     uint32_t splat;
-    uint32_t pair; /* number of its gradient record: all of one splat stand together */
+    uint32_t pair; /* number of its gradient record; those of one splat are consecutive */
 } tile_entry;
 
-/* One tile: what is drawn in it, and its pixels, block by block. */
+/* The pixels of one tile, block by block. */
 typedef struct tile_pixels {
     _Alignas(64) float rgb[TILE_BLOCKS][3][PIXEL_LANES]; /* forward: out, with the background; backward:
                                                             dL/d(rgb), 0 outside the image */

@@ -5,9 +5,8 @@
    Two forms. RASTER_EWA has the conventions of 3D Gaussian splatting: each Gaussian becomes a 2D Gaussian by
    the affine projection at its centre (Zwicker 2001; Kerbl 2023, eq 5), dilated by 0.3 px^2, and all pixels
    blend in the order of the centres' depths. RASTER_PER_RAY keeps the tiles but takes response and order from
-   the ray of each pixel, as docs/tracing.md defines them: so the difference between the two is that of
-   projection and order. The rasterizer shares the cameras and the Gaussian arrays with the tracer, nothing
-   else. */
+   the ray of each pixel, as docs/tracing.md defines them, so that the two forms differ in projection and
+   order alone. The rasterizer shares the cameras and the Gaussian arrays with the tracer, nothing else. */
 #ifndef GBT_RASTER_RASTER_H
 #define GBT_RASTER_RASTER_H
 

@@ -41,7 +41,7 @@ typedef struct packet_rays {
     _Alignas(64) float dir[3][PACKET_LANES];        /* unit; lanes that are not active repeat an active one */
     _Alignas(64) float far[PACKET_LANES];           /* hits at this t_c or behind are not seen */
     _Alignas(64) float background[3][PACKET_LANES]; /* background colour of each ray */
-    /* with tile_rays.parts, which list kernels know: */
+    /* set with tile_rays.parts; only list kernels read them: */
     _Alignas(64) float near[PACKET_LANES], T_front[PACKET_LANES]; /* see ray_image */
     unsigned active; /* bit per lane; 0: the packet is not traced */
 } packet_rays;

@@ -4,8 +4,9 @@
    load_list() copies the records of the part's Gaussians, with slopes relative to the middle of the tile;
    finds a depth for each, by which it sorts them (long lists by radix sort, short ones by counting smaller
    keys), and a lower bound of the depth anywhere in the tile. list->nearest[] holds the smallest bound from
-   each sixteen on: a packet may stop there when its rays became opaque before it. rows_in_packet() tests
-   sixteen ellipses at once against the slopes of a packet. Included by list_kernel.inc.h. */
+   each sixteen on: a packet stops there once its rays have become opaque in front of that depth.
+   rows_in_packet() tests sixteen ellipses at once against the slopes of a packet. Included by
+   list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST16_H
 #define GBT_TRACE_LIST16_H
 

@@ -25,8 +25,8 @@ static const float component_least = 0.3f;
 
 /* ---- axes ---- */
 
-/* Of the valid directions on a grid of pixels all over the picture: their sum, and their change along its
-   rows. */
+/* From the valid directions on a coarse grid of pixels: their sum (`middle`), and how they change along the
+   rows of the picture (`along`). */
 static void find_directions(const ray_image *rays, double middle[3], double along[3])
 {
     enum { STEPS = 8 };

@@ -107,7 +107,7 @@ static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet
             vfloat16_max(vfloat16_mul(limits.reached, vfloat16_set1(1.000001f)), vfloat16_set1(FLT_MIN));
         limits.far = vfloat16_select(vfloat16_lt(limits.product, opaque), vfloat16_min(limits.far, behind),
                                      limits.far);
-        /* What still waits in the queue is of this sixteen. */
+        /* What still waits in the queue is of this sixteen: its bound holds; else that of the next one. */
         const float nearest = list->nearest[first / 16 + (queue.count == 0)];
         if (!vmask16_any(vfloat16_lt(vfloat16_mul(length, vfloat16_set1(nearest)), limits.far)))
             break;

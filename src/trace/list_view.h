@@ -3,8 +3,8 @@
    its faces, and the list of each tile. What list_faces.c and list_build.c make and the kernels of
    list_kernel.h read.
 
-   In the axes u, v, w of a face a ray is s (a, b, 1): a and b are its slopes. Rays that look into one half
-   space have one face; others the six of a cube. */
+   In the axes u, v, w of a face a ray is s (a, b, 1): a and b are its slopes. Rays within 72 degrees of their
+   mean direction have one face; others the six faces of a cube. */
 #ifndef GBT_TRACE_LIST_VIEW_H
 #define GBT_TRACE_LIST_VIEW_H
 
@@ -47,12 +47,12 @@ typedef struct box_lanes {
     _Alignas(64) float edge[4][16];
 } box_lanes;
 
-/* One face and its parts, which stand together. */
+/* One face and its parts, which are consecutive. */
 typedef struct list_face {
     list_frame frame;
     slope_box bounds; /* of all its parts */
     size_t first_part, part_count;
-    size_t first_box16, box16_count; /* its part of list_view.boxes16 */
+    size_t first_box16, box16_count; /* its range of list_view.boxes16 */
     size_t first_box256, box256_count;
 } list_face;
 
@@ -91,7 +91,7 @@ _Static_assert(sizeof(list_record) == 64 && sizeof(list_shape) == 32, "a cache l
 /* A Gaussian in the list of a tile. */
 typedef struct list_pair {
     uint32_t record;
-    uint32_t slot; /* number of its gradient record: all of one Gaussian stand together */
+    uint32_t slot; /* number of its gradient_slot; those of one record are consecutive */
 } list_pair;
 
 /* What the tiles add to the gradients of a Gaussian: sums over hits of h = dL/d(d2), h v, h v v^T (xx yy zz
@@ -120,8 +120,8 @@ typedef struct list_view {
     list_part *parts; /* face by face, in the order of the tiles; with one face, a part is a tile */
     size_t part_count;
     slope_box *part_boxes; /* [parts] around each part's rays */
-    box_lanes *boxes16;    /* the same of sixteen parts each, face by face */
-    box_lanes *boxes256;   /* and sixteen boxes around sixteen parts each */
+    box_lanes *boxes16;    /* part_boxes of sixteen parts each, in lanes; face by face */
+    box_lanes *boxes256;   /* boxes around sixteen parts each, sixteen of them in lanes */
     size_t block_count;    /* of Gaussians */
     uint16_t *reached; /* [face][block][LIST_GRAIN / 16] bit per Gaussian that may reach into the face; six
                           faces only */

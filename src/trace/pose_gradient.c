@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* trace/pose_gradient.c -- forces and torques of all Gaussians, summed. */
+/* trace/pose_gradient.c -- the sums of pose_gradient.h: the gradient of a mean acts as a force; with that of
+   the rotation it gives a torque about the camera's centre. */
 #include "trace/pose_gradient.h"
 
 #include "base/fail.h"

@@ -7,7 +7,7 @@
 #include "gbtrace/camera.h"
 
 /**
- * Gradient by the six numbers of a small motion of the camera, (v, omega) in camera axes as
+ * Gradient with respect to the six numbers of a small motion of the camera, (v, omega) in camera axes as
  * gbt_camera_moved() takes them.
  *
  * What a ray sees, and how wide its pixel is, depends on camera and Gaussians together only: a rigid motion

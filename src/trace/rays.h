@@ -82,14 +82,14 @@ gbt_status ray_shot_check(const ray_shot *shot, gbt_error *err);
  *   has in focus.
  *
  * @param sample [in] 0 .. ray_shot_sample_count() - 1
- * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are used again when the size
- *                        is the same, what it keeps of lenses always; empty on failure
+ * @param out    [in,out] start from {0}, free with ray_image_free(); its arrays are reused when the size
+ *                        is the same, its lenses always; empty on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (a size < 1, a camera that sees nothing, a pose that is not finite or not
  *         a rotation, rays that start beyond 1e17, an aperture without a focus), GBT_ERR_NO_MEMORY
  * Threads: runs in parallel over rows; same bits for every thread count.
  * Cost: 0.4 to 1 ms of one core per 10^5 rays of a pinhole or orthographic camera, also when it moves by
- * rows; 2 ms by columns; 7 ms with an aperture; a distorted lens 20 to 60 ms more when it is none of those
- * that `out` still has.
+ * rows; 2 ms by columns; 7 ms with an aperture; a distorted lens 20 to 60 ms more unless `out` still has its
+ * directions.
  */
 gbt_status ray_image_from_shot(const ray_shot *shot, int sample, ray_image *out, gbt_error *err);
 

@@ -44,7 +44,7 @@ static void write_records(size_t block, size_t begin, size_t end, void *context)
         const double scale[3] = {(double)g->scale_x[i], (double)g->scale_y[i], (double)g->scale_z[i]};
         double m[9];
         dquat_to_matrix(q, m);
-        for (int row = 0; row < 3; row++) /* S^-1 R^T: row i is axis i of the ellipsoid over its length */
+        for (int row = 0; row < 3; row++) /* S^-1 R^T: row i is the unit vector of axis i over its scale */
             for (int column = 0; column < 3; column++)
                 record[RECORD_MATRIX + 3 * row + column] = (float)(m[3 * column + row] / scale[row]);
         record[RECORD_MEAN] = g->mean_x[i];
@@ -363,7 +363,7 @@ gbt_status trace_backward(trace_scene *scene, const ray_image *rays, const image
                          "trace: adjoint of %d x %d rays, but the kept forward pass has %d x %d", rays->width,
                          rays->height, scene->tape_width, scene->tape_height);
     pass p = {.scene = scene, .inputs = scene_for_kernel(scene), .rays = rays, .d_rgb = d_rgb};
-    scene->tape_width = scene->tape_height = 0; /* each tile lets go of its tape */
+    scene->tape_width = scene->tape_height = 0; /* every tile releases its tape */
     if (scene->listed)
         GBT_TRY(list_builder_reserve_slots(&scene->lists, err));
     GBT_TRY(run_pass(&p, err));

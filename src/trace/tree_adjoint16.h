@@ -59,7 +59,7 @@ static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[
         gradient_record *g = gradient_list_find(out, entry[i].id);
         if (g == NULL)
             return false;
-        float *record = (float *)(void *)g; /* all of it: the id is not added to */
+        float *record = (float *)(void *)g; /* all 16 numbers; the select leaves the id alone */
         const vfloat16 before = vfloat16_load(record);
         vfloat16_store(record, vfloat16_select(sums, vfloat16_add(before, of_entry[i]), before));
     }
@@ -295,7 +295,7 @@ static void sum_rays(const kernel_scene *scene, const tape_entry *entry, const v
             gradient_terms(vfloat16_select(blended, d_alpha, zero), row_load(o->field[FIELD_RAW], row),
                            row_load(o->field[FIELD_WEIGHT], row), v, vfloat16_set1(record[RECORD_OPACITY]),
                            alpha_max, d_rgb, terms);
-            row_store(o->field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* its place is free now */
+            row_store(o->field[FIELD_RAW], row, vfloat16_sum_rows(terms)); /* raw is not needed any more */
         }
     }
 }

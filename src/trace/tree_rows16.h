@@ -48,8 +48,8 @@ typedef struct row_window {
     int low, high;
 } row_window;
 
-/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none;
-   returned is the nearest of all. */
+/* Nearest and farthest hit of each of `count` rows (room for whole sixteens), 0 for the farthest of none.
+   Returns the nearest of all. */
 static inline float row_depths(const float *t, int count, float *near, float *far)
 {
     const vfloat16 infinite = vfloat16_set1(INFINITY);

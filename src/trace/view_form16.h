@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/view_form16.h -- Gaussians as seen from one point, in a form whose response takes sixteen operations.
 
-   Rays that start at one point: in a frame of three axes there a ray is s (a, b, 1), and a Gaussian's mean
-   is m = m_w (a0, b0, 1). The canonical axes may be turned freely, because only lengths count there. Turned
-   so that the mean lies on the first axis, and the second takes all of the rest of axis u (a QR decomposition
-   of S^-1 R^T), the canonical direction over its own length at the mean is
+   Rays that start at one point: in a frame of three axes there a ray is s (a, b, 1), and a Gaussian's mean is
+   m = m_w (a0, b0, 1). The canonical axes may be turned freely, because only lengths count there. They are
+   turned so that the image of the mean lies on the first axis, and that of u in the plane of the first two (a
+   QR decomposition of S^-1 R^T). Then the canonical direction, divided by its length at the mean, is
 
        w1 = 1 + q1 (a - a0) + q2 (b - b0)      w2 = q3 (a - a0) + q4 (b - b0)      w3 = q5 (b - b0)
 
@@ -41,14 +41,14 @@ static inline void view_form_find(const float (*basis)[3], const gaussian_lanes 
         unit[i] = vfloat16_mul(g->matrix[i], smallest);                                   /* S^-1 R^T */
         stretch[i] = vfloat16_mul(unit[i], vfloat16_div(square[i / 3], smallest_square)); /* S R^T */
     }
-    vfloat16 along[3][3], wide[3][3]; /* images of u, v, w */
+    vfloat16 along[3][3], wide[3][3]; /* images of u, v, w under `unit`, `stretch` */
     for (int axis = 0; axis < 3; axis++)
         for (int i = 0; i < 3; i++) {
             along[axis][i] = dot_lanes(basis[axis], unit + 3 * i);
             wide[axis][i] = dot_lanes(basis[axis], stretch + 3 * i);
         }
-    /* cw: image of (a, b, 1); its products with the images of u and v are the cofactors' images of v - b w
-       and a w - u. */
+    /* cw: the image of (a, b, 1), the direction of the mean. Its cross products with the images of u and v
+       are the cofactor matrix, det S R^T, applied to v - b w and a w - u. */
     vfloat16 cw[3], bu[3], bv[3];
     for (int i = 0; i < 3; i++) {
         cw[i] = vfloat16_fma(a, along[0][i], vfloat16_fma(b, along[1][i], along[2][i]));

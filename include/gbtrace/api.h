@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gbtrace/api.h -- what stands around the declarations of every public header: C names also in C++, and
-   visible in the shared library. */
+/* gbtrace/api.h -- macros around the declarations of every public header: C linkage in C++, and default
+   visibility in the shared library. */
 #ifndef GBTRACE_API_H
 #define GBTRACE_API_H
 
-/* Everything else in libgbtrace.so is hidden. */
-/* The formatter would join braces without their other half. */
+/* The library is built with hidden visibility: only what stands between these two macros is exported from
+   libgbtrace.so. */
+/* clang-format would join the unbalanced braces of these macros. */
 /* clang-format off */
 #ifdef __cplusplus
 #define GBT_API_BEGIN _Pragma("GCC visibility push(default)") extern "C" {

@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gbtrace/camera.h -- a posed camera: lens model, image size, pose, and how it moves while it is read out.
+/* gbtrace/camera.h -- a posed camera: lens model, image size, pose, and its motion while a rolling shutter
+   reads the image out.
 
-   Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height] and the
-   centre of the top-left pixel is (0.5, 0.5). Lens formulas: docs/cameras.md. */
+   Camera axes are COLMAP's: x right, y down, z forward. The image spans [0, width] x [0, height], and the
+   centre of the top-left pixel is (0.5, 0.5). Lens formulas: docs/cameras.md.
+
+   Threads: every function here is a pure function of its arguments and may be called from any thread.
+   `camera` is borrowed for the call. */
 #ifndef GBTRACE_CAMERA_H
 #define GBTRACE_CAMERA_H
 
@@ -12,7 +16,7 @@
 
 GBT_API_BEGIN
 
-/** COLMAP's numbers and parameter orders; behind them what COLMAP does not have. */
+/** Lens models, with COLMAP's numbers and parameter orders; those that COLMAP does not have follow. */
 typedef enum gbt_camera_model {
     GBT_CAMERA_SIMPLE_PINHOLE = 0,              /* f cx cy */
     GBT_CAMERA_PINHOLE = 1,                     /* fx fy cx cy */
@@ -31,20 +35,21 @@ typedef enum gbt_camera_model {
     GBT_CAMERA_SIMPLE_FISHEYE = 14,             /* f cx cy */
     GBT_CAMERA_FISHEYE = 15,                    /* fx fy cx cy */
     GBT_CAMERA_EUCM = 16,                       /* fx fy cx cy alpha beta */
-    GBT_CAMERA_EQUIRECTANGULAR = 17,            /* w h; and the last two of all params, 0 in data sets: the
-                                                   image point where the whole panorama begins */
-    GBT_CAMERA_MODEL_COUNT,                     /* of COLMAP's models: what a data set can hold */
-    GBT_CAMERA_ORTHOGRAPHIC = 100 /* sx sy cx cy, pixels per unit: parallel rays. COLMAP has no number for it
-                                   */
+    GBT_CAMERA_EQUIRECTANGULAR = 17,            /* w h of the whole panorama. params[14] and params[15], 0 in
+                                                   data sets, are the image point of the panorama's top-left
+                                                   corner: this image may be a part of it */
+    GBT_CAMERA_MODEL_COUNT,                     /* number of the models above, which a data set can contain */
+    GBT_CAMERA_ORTHOGRAPHIC = 100 /* sx sy cx cy, sx and sy in pixels per scene unit: parallel rays. Not in
+                                     COLMAP */
 } gbt_camera_model;
 
 enum { GBT_CAMERA_MAX_PARAMS = 16 };
 
-/** Which pixels of an image are taken at the same time. */
+/** Which pixels of an image are exposed at the same time. */
 typedef enum gbt_camera_shutter {
-    GBT_CAMERA_SHUTTER_GLOBAL, /* all, the default */
-    GBT_CAMERA_SHUTTER_ROWS,   /* those of a row: a rolling shutter */
-    GBT_CAMERA_SHUTTER_COLUMNS /* those of a column */
+    GBT_CAMERA_SHUTTER_GLOBAL, /* all of them; the default */
+    GBT_CAMERA_SHUTTER_ROWS,   /* those of one row: a rolling shutter */
+    GBT_CAMERA_SHUTTER_COLUMNS /* those of one column: a rolling shutter */
 } gbt_camera_shutter;
 
 typedef struct gbt_camera {
@@ -53,12 +58,12 @@ typedef struct gbt_camera {
     double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order, then 0; lengths in pixels */
     double rotation[9];                   /* world to camera, row-major, orthonormal within 1e-3, det +1 */
     double center[3];                     /* camera centre, world (scene-local) units */
-    gbt_camera_shutter shutter; /* with a rolling one, the pose is that of the image's middle, and */
-    double motion[6]; /* the camera's while the image is read out, edge to edge, downwards or to the right,
-                         even and along a line, as gbt_camera_moved() takes it */
+    gbt_camera_shutter shutter; /* with a rolling shutter, the pose is that of the middle row or column */
+    double motion[6]; /* rolling shutter: motion from the image's first edge to its last (downwards or to the
+                         right), at constant velocity along a line; components as in gbt_camera_moved() */
 } gbt_camera;
 
-/** How many models there are, and the one of a place in their list, 0 to count - 1. */
+/** Number of lens models, and the model at `index` in their list, 0 to count - 1. */
 int gbt_camera_model_count(void);
 gbt_camera_model gbt_camera_model_at(int index);
 
@@ -83,24 +88,25 @@ bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double
 /**
  * The ray through a point of the image, in world axes.
  *
- * @param origin [out] the camera centre (with a rolling shutter: when that point is taken); for an
- *                     orthographic camera the point of its plane through the centre
+ * @param origin [out] the camera centre (with a rolling shutter: at the moment that this image point is
+ *                     exposed); for an orthographic camera the ray's point on the image plane through the
+ *                     centre
  * @param dir    [out] unit vector; both untouched on failure
  * @return as gbt_camera_unproject()
  */
 bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3]);
 
 /**
- * Image point of a point of the world: the inverse of gbt_camera_ray(). With a rolling shutter it is found by
- * steps, each from the pose of the point found before; where the camera moves so fast that it sees a point
- * twice it is one of the two, or none.
+ * Image point of a world point: the inverse of gbt_camera_ray(). With a rolling shutter it is found by
+ * iteration: each step projects with the pose at the image point found before. Where the camera moves so fast
+ * that it sees a point twice, the result is one of the two image points, or none.
  *
  * @return false where the camera does not see the point; `pixel` may lie outside the image
  */
 bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2]);
 
-/** Image point of a point in camera axes; false where the model does not see it. The formulas that
-    gbt_camera_unproject() inverts. */
+/** Image point of a point in camera axes; false where the model does not see it. gbt_camera_unproject()
+    inverts these formulas. */
 bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2]);
 
 /** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need
@@ -109,27 +115,28 @@ gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 
 /**
  * The camera whose pixels are every `step`-th of this one's, in both directions, from pixel (x, y) on: ray
- * (i, j) of `out` is ray (x + step i, y + step j) of `camera`. Its size is floor(size / step), whatever x and
- * y are in [0, step). A rolling shutter goes on over its part of the time.
+ * (i, j) of `out` is ray (x + step i, y + step j) of `camera`. Its size is floor(size / step) for any x and y
+ * in [0, step). A rolling shutter's motion is scaled to the rows or columns that are left.
  *
- * @return false for an unknown model, and where no pixel would be left; `out` is untouched then
+ * @return false for an unknown model, or when no pixel would be left; `out` is untouched then
  */
 bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_camera *out);
 
 /**
- * The camera whose pixel (i, j) has its middle at the point (i + 0.5 + dx, j + 0.5 + dy) of this one's
- * picture.
+ * The camera whose pixel (i, j) has its centre at the point (i + 0.5 + dx, j + 0.5 + dy) of this camera's
+ * image.
  *
  * @return false for an unknown model; `out` is untouched then
  */
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 
-/** The camera of a part of the image: `width` by `height` pixels, the first of which is (x, y) of this one.
-    False as gbt_camera_shifted(). */
+/** The camera of a part of the image: `width` x `height` pixels, with pixel (x, y) of this image at the top
+    left. Returns false as gbt_camera_shifted() does. */
 bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out);
 
 /**
- * Set the pose of `camera`: at `origin`, `target` in the middle of the image, `up` towards its top.
+ * Set the pose of `camera`: its centre at `origin`, `target` in the middle of the image, `up` towards the top
+ * of the image.
  *
  * @return false, and nothing changed, when `target` is at `origin`, `up` is along the view (within 1e-9 rad),
  *         or a value is not finite
@@ -138,21 +145,22 @@ bool gbt_camera_look_at(const double origin[3], const double target[3], const do
                         gbt_camera *camera);
 
 /**
- * The camera after a small motion of its own, and the motion for which pose gradients are taken
- * (gbtrace/model.h).
+ * The camera after a small motion in its own axes. Pose gradients (gbtrace/model.h) are taken with respect to
+ * this motion.
  *
  * @param motion [in] (v, omega): v moves the centre along the camera's axes (right, down, forward), scene
  *                    units; omega turns the camera about the same axes through its centre, right-handed,
- *                    radians: center + R^T v and exp([omega]x)^T R for a rotation R, [omega]x a = omega x a
+ *                    radians. The new centre is center + R^T v, the new rotation exp([omega]x)^T R, with R
+ *                    the world-to-camera rotation and [omega]x a = omega x a
  */
 gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
 
-/** The camera as it stands when an image point is taken: without a rolling shutter. Its own copy where it has
-    none. */
+/** The global-shutter camera with the pose at which an image point is exposed. Without a rolling shutter it
+    is a copy of `camera`. */
 gbt_camera gbt_camera_at(const gbt_camera *camera, double px, double py);
 
 /**
- * tan of half the horizontal and vertical field of view of the pinhole that best stands for this camera:
+ * tan of half the horizontal and vertical field of view of the pinhole camera with the same focal lengths:
  * width / (2 fx), height / (2 fy). 0 for parallel rays.
  */
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);

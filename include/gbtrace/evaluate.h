@@ -15,33 +15,34 @@ GBT_API_BEGIN
 typedef struct gbt_evaluate_def {
     const char *data;      /* data set folder; NULL: the one the model was trained on. Default NULL */
     const char *json;      /* also write the scores here; NULL: nowhere else. Default NULL */
-    gbt_renderer renderer; /* that trains, or GBT_RENDERER_AS_TRAINED, the default */
+    gbt_renderer renderer; /* one that can train, or GBT_RENDERER_AS_TRAINED, the default */
     double downscale;      /* photos are divided by this, >= 1; 0: as in training. Default 0 */
     bool report;           /* also write RUN/report.html. Default true */
     gbt_preset preset;     /* default GBT_PRESET_AS_TRAINED */
-    bool tensorboard;  /* also write RUN/events.out.tfevents.1.eval: scores, up to eight renders and photos.
-                          Default false */
-    const char *lpips; /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score.
-                          Default NULL */
-    uint32_t cookie_;  /* set by gbt_evaluate_def_default() */
+    bool tensorboard;      /* also write RUN/events.out.tfevents.1.eval: scores, and up to eight renders with
+                              their photos. Default false */
+    const char *lpips;     /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score.
+                              Default NULL */
+    uint32_t cookie_;      /* set by gbt_evaluate_def_default() */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);
 
 /**
  * Score the held-out views of a run: PSNR, SSIM and FLIP on 8-bit images, per view and mean. A run trained
- * with `exposure` is scored on the right half of each photo, after a 3 x 4 colour matrix that its left half
- * gives; metrics.json says so in "scored".
+ * with `exposure` is scored on the right half of each photo, after applying a 3 x 4 colour matrix fitted to
+ * its left half; metrics.json says so in "scored".
  *
- * Renders go to RUN/renders/test/NAME.png, the photos they are compared with to
- * RUN/renders/test/NAME.photo.png; scores to RUN/metrics.json; RUN/report.html shows all of it. Without
+ * Renders are written to RUN/renders/test/NAME.png, the photos they are compared with to
+ * RUN/renders/test/NAME.photo.png, the scores to RUN/metrics.json; RUN/report.html shows all of them. Without
  * held-out views the scores are null ("n/a"), never NaN.
  *
  * With other settings than the run's own (another renderer, size, preset or data set, unless the run's own
  * data set is gone) nothing in RUN changes: the scores go to stderr, and to the file `json` when it is given
  * (GBT_ERR_ARGUMENT when that is RUN/metrics.json).
  *
- * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED: scores and report are as before.
+ * SIGINT and SIGTERM stop before the next view with GBT_ERR_INTERRUPTED; scores and report then stay as they
+ * were.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERRUPTED
  *
@@ -61,19 +62,22 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
  */
 gbt_status gbt_report(const char *run, const char *const *studies, size_t study_count, gbt_error *err);
 
-/** Two pictures compared. */
+/** Scores of one image against another. */
 typedef struct gbt_comparison {
     int width, height;
     double psnr;          /* dB, at most 100 */
-    double ssim;          /* as everywhere here: every pixel counts, windows see 0 beyond the border */
-    double ssim_interior; /* over the windows that lie wholly inside; NaN below 11 x 11 pixels */
+    double ssim;          /* as in all scores of this library: every pixel counts, windows are padded with 0
+                             beyond the border */
+    double ssim_interior; /* over the windows that lie entirely inside the image; NaN below 11 x 11 pixels */
     double flip;          /* at 67.02 pixels per degree */
-    double lpips;         /* of colours in [-1, 1], as the network was trained; NaN without a network */
-    double lpips_01;      /* of colours in [0, 1], as the scores of 3DGS are made; likewise */
+    double lpips;         /* of colours scaled to [-1, 1], as the network was trained; NaN without a
+                             network */
+    double lpips_01;      /* of colours left in [0, 1], as the published scores of 3DGS use it; NaN without a
+                             network */
 } gbt_comparison;
 
 /**
- * Compare two image files of one size (PNG, JPEG, EXR; alpha is left out), rounded to 8 bit; `reference` is
+ * Compare two image files of equal size (PNG, JPEG, EXR; alpha is ignored), rounded to 8 bit; `reference` is
  * the original.
  *
  * @param network [in] .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score
@@ -86,7 +90,7 @@ gbt_status gbt_compare_images(const char *path, const char *reference, const cha
                               gbt_comparison *out, gbt_error *err);
 
 /**
- * gbt_compare_images() for pictures in memory, [height][width][3], also rounded to 8 bit; without LPIPS.
+ * gbt_compare_images() for images in memory, [height][width][3], also rounded to 8 bit; without LPIPS.
  *
  * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
  *
@@ -96,33 +100,33 @@ gbt_status gbt_compare_pictures(const float *picture, const float *reference, in
                                 gbt_comparison *out, gbt_error *err);
 
 typedef struct gbt_render_def {
-    const char *data;          /* data set whose cameras are used; NULL: the model's. Default NULL */
+    const char *data;          /* data set whose cameras are used; NULL: the one that the model names. Default
+                                  NULL */
     gbt_split split;           /* default GBT_SPLIT_TEST */
     gbt_renderer renderer;     /* default GBT_RENDERER_AS_TRAINED */
     gbt_picture_format format; /* default GBT_PICTURE_PNG */
     double downscale;          /* 0: as in training. Default 0 */
-    const char *camera;        /* camera file (docs/cameras.md): render that and no views; the data set is not
-                                  needed. Default NULL */
-    const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". Traced, of the
-                            Gaussians without meshes: refused with another renderer, that of a run trained
-                            with splats, too. Default NULL */
+    const char *camera;        /* camera file (docs/cameras.md): render this camera instead of the views; the
+                                  data set is not needed. Default NULL */
+    const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". They are traced,
+                            from the Gaussians without the inserted meshes; refused with any other renderer,
+                            also when a run trained with splats implies it. Default NULL */
     gbt_preset preset;   /* default GBT_PRESET_AS_TRAINED */
-    const char *insert;  /* meshes to put into the scene (docs/inserting.md); traced only.
-                            Default NULL */
-    const char *path;    /* a film in place of views (docs/video.md): "orbit", "interpolate", or the name of a
+    const char *insert;  /* meshes to insert into the scene (docs/inserting.md); traced only. Default NULL */
+    const char *path;    /* a film instead of views (docs/video.md): "orbit", "interpolate", or the name of a
                             path file. Default NULL */
-    int frames; /* of the film, [0, 100000]; 0: 240 around, 15 for each training camera (900 at most), as many
-                   as a file has. Default 0 */
+    int frames; /* of the film, [0, 100000]; 0: 240 for an orbit, 15 per training camera (at most 900) for an
+                   interpolation, and as many as a path file has. Default 0 */
     double fps; /* frames per second, [0, 1000], in a .gif at most 50; 0: what a path file says, else
                    30. Default 0 */
-    int width, height;   /* of the film, both 0 or in [1, 65500]; the shorter side sees as much as in the
-                            photos. Default 0: as they, to even numbers */
-    const char *look_at; /* path "orbit": what it is around, "X,Y,Z" in the data set's coordinates. NULL: as
-                            the photos' cameras look. Default NULL */
+    int width, height;   /* of the film, both 0 or in [1, 65500]; the shorter side has the photos' field of
+                            view. Default 0: the size of the photos, rounded to even numbers */
+    const char *look_at; /* path "orbit": its centre, "X,Y,Z" in the data set's coordinates. NULL: what the
+                            photos' cameras look at. Default NULL */
     double orbit_radius; /* path "orbit": distance from the vertical axis through that point, (0, 1e9], scene
-                            units; NaN: as the photos' cameras. Default NaN */
-    double orbit_height; /* path "orbit": height above that point, scene units; NaN: as the photos' cameras.
-                            Default NaN */
+                            units; NaN: that of the photos' cameras. Default NaN */
+    double orbit_height; /* path "orbit": height above that point, scene units; NaN: that of the photos'
+                            cameras. Default NaN */
     /** Bytes that the program may take (docs/memory.md): a larger .ply of plain Gaussians is traced cell by
         cell, without outputs and meshes. 0, the default: no limit. */
     size_t memory;

@@ -160,8 +160,9 @@ gbt_camera gbt_camera_moved(const gbt_camera *camera, const double motion[6]);
 gbt_camera gbt_camera_at(const gbt_camera *camera, double px, double py);
 
 /**
- * tan of half the horizontal and vertical field of view of the pinhole camera with the same focal lengths:
- * width / (2 fx), height / (2 fy). 0 for parallel rays.
+ * tan of half the horizontal and vertical field of view of a pinhole camera with the same focal lengths:
+ * width / (2 fx), height / (2 fy). For a panorama fx and fy are its pixels per radian at the centre. 0 for
+ * parallel rays.
  */
 void gbt_camera_half_fov_tan(const gbt_camera *camera, double tan_half[2]);
 

@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gbtrace/query.h -- balls and anchors by place: nearest, within a radius, those that contain a point,
-   overlap a ball, or are crossed by a ray; over a run, a file of balls, any point cloud, or your own arrays.
+/* gbtrace/query.h -- spatial queries over balls and anchors: nearest, within a radius, containing a point,
+   overlapping a ball, crossed by a ray; in a run, a file of balls, any point cloud, or your own arrays.
 
-   Answers are exact: those of double arithmetic on the coordinates given, as a test of every ball would find
-   them, ties by index. Coordinates are in double and those of the data set or file. docs/queries.md has a
-   tour. */
+   Answers are exact: the same as testing every ball in double arithmetic, with ties ordered by index.
+   Coordinates are doubles, in the system of the data set or file. docs/queries.md has a tour. */
 #ifndef GBTRACE_QUERY_H
 #define GBTRACE_QUERY_H
 
@@ -19,10 +18,10 @@
 GBT_API_BEGIN
 
 /**
- * Balls, points being balls of radius 0, and a tree over them. Nothing changes once it is made.
+ * A set of balls (points are balls of radius 0) with a search tree. Immutable once made.
  *
- * Threads: queries from any number of threads at once; each uses all processors that gbt_set_threads()
- * allows, and answers the same for any number of them.
+ * Threads: any number of threads may query at the same time; each query runs on all threads that
+ * gbt_set_threads() allows, with the same answers for any number of them.
  */
 typedef struct gbt_balls gbt_balls;
 
@@ -31,19 +30,19 @@ typedef struct gbt_balls gbt_balls;
 /**
  * Balls from a file or folder.
  *
- * A run or its model file: a ball per anchor, around everything that its Gaussians can show in any view: the
- * farthest of their centres, and beyond it the largest std-dev as far as a response of 1/255 reaches. Plain
- * Gaussians: a ball per Gaussian, to where its response falls to 1/255, at least 0; those left out because a
- * value is not usable are not counted. A .ply of other vertices (also of gbtrace init): its `radius`, or
- * points. A data set: its sparse points. A text file: a line per ball, "x y z" or "x y z radius", commas or
- * blanks, # for comments.
+ * A run or its model file: a ball per anchor that encloses everything its Gaussians can show in any view: the
+ * radius is the distance to the farthest of their centres, plus the distance at which the largest std-dev has
+ * a response of 1/255. Plain Gaussians: a ball per Gaussian, out to where its response falls to 1/255, radius
+ * at least 0; Gaussians with unusable values are left out and not counted. A .ply of other vertices (also of
+ * gbtrace init): its `radius`, or points. A data set: its sparse points. A text file: a line per ball, "x y
+ * z" or "x y z radius", commas or blanks, # for comments.
  *
  * @param path [in]  RUN, model.gbt, plain Gaussians in any format of gbt_export_format_at(), .ply, data set
  *                   folder, or .txt, .csv, .xyz
  * @param out  [out] free with gbt_balls_free(); NULL on failure
  * @param err  [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
- * Cost: O(n log n); about 90 bytes a ball are kept.
+ * Cost: O(n log n); keeps about 90 bytes per ball.
  */
 gbt_status gbt_balls_open(const char *path, gbt_balls **out, gbt_error *err);
 
@@ -63,12 +62,12 @@ gbt_status gbt_balls_from_arrays(const double *position, const double *radius, s
 /** NULL is fine. */
 void gbt_balls_free(gbt_balls *balls);
 
-/** What there is; borrowed until gbt_balls_free(). */
+/** The balls of a set; borrowed until gbt_balls_free(). */
 typedef struct gbt_balls_view {
     size_t count;
     const double *position; /* [count][3] */
     const double *radius;   /* [count]; NULL: points */
-    bool anchors;           /* a ball is an anchor of a run */
+    bool anchors;           /* true: the balls are the anchors of a run */
 } gbt_balls_view;
 
 gbt_balls_view gbt_balls_get(const gbt_balls *balls);
@@ -80,7 +79,7 @@ gbt_balls_view gbt_balls_get(const gbt_balls *balls);
  *
  * @param point    [in]  [count][3], within +-1e100
  * @param k        [in]  >= 1
- * @param skip_same [in] ball i is no answer to query i: the points are the balls' own centres
+ * @param skip_same [in] exclude ball i from the answer to query i: for points that are the balls' own centres
  * @param index    [out] [count][k]; UINT32_MAX where there are fewer than k
  * @param distance [out] [count][k]; infinite where there are fewer
  * @param err      [out] optional
@@ -90,21 +89,21 @@ gbt_balls_view gbt_balls_get(const gbt_balls *balls);
 gbt_status gbt_balls_nearest(const gbt_balls *balls, const double *point, size_t count, size_t k,
                              bool skip_same, uint32_t *index, double *distance, gbt_error *err);
 
-/** Answers of many queries: those of query i are index[first[i]] .. index[first[i + 1] - 1], ascending. Start
+/** Answers to many queries: query i has index[first[i]] .. index[first[i + 1] - 1], in ascending order. Start
     from {0}; free with gbt_answers_free(), also after a failure. */
 typedef struct gbt_answers {
     size_t count;    /* queries */
     size_t *first;   /* [count + 1] */
     uint32_t *index; /* [first[count]] balls */
-    double *value;   /* [first[count]]; distance to the centre; of rays the t of the point of the segment that
+    double *value;   /* [first[count]]; distance to the centre; for rays, t of the point on the segment that
                         is nearest to the centre */
 } gbt_answers;
 
 void gbt_answers_free(gbt_answers *answers);
 
-/* What the next four have in common: count queries, points and origins within +-1e100; GBT_OK,
-   GBT_ERR_ARGUMENT (names the first bad query), GBT_ERR_NO_MEMORY. Cost: about O(log n + m) each, of m
-   answers. */
+/* The next four functions answer `count` queries, with points and origins within +-1e100. They return GBT_OK,
+   GBT_ERR_ARGUMENT (names the first bad query) or GBT_ERR_NO_MEMORY. Cost: about O(log n + m) per query with
+   m answers. */
 
 /** Centres within radius[i] (>= 0, may be infinite) of point[i]. */
 gbt_status gbt_balls_within(const gbt_balls *balls, const double *point, const double *radius, size_t count,
@@ -119,7 +118,7 @@ gbt_status gbt_balls_overlapping(const gbt_balls *balls, const double *point, co
                                  size_t count, gbt_answers *out, gbt_error *err);
 
 /**
- * Balls that meet the segment origin[i] + t direction[i], t_min[i] <= t <= t_max[i].
+ * Balls that intersect the segment origin[i] + t direction[i], t_min[i] <= t <= t_max[i].
  *
  * @param direction [in] [count][3], within +-1e100, one component at least 1e-100 or at most -1e-100
  * @param t_min, t_max [in] [count], may be negative or infinite; NULL: 0, infinity
@@ -140,10 +139,11 @@ typedef enum gbt_query_kind {
 
 typedef struct gbt_query_def {
     gbt_query_kind kind; /* default GBT_QUERY_NEAREST */
-    const char *at;      /* one query: "x,y,z", or of GBT_QUERY_CROSSED "x,y,z,dx,dy,dz" and perhaps
+    const char *at;      /* one query: "x,y,z", or for GBT_QUERY_CROSSED "x,y,z,dx,dy,dz" with an optional
                             ",t_min,t_max". Default NULL */
-    const char *from;    /* a file with such a line per query (not of rays: a .ply too); a fourth number is a
-                            radius of its own. Default NULL; one of the two is needed */
+    const char *from;    /* a file with one such line per query (for all but rays also a .ply); a fourth
+                            number is that query's own radius. Default NULL; either `at` or `from` is
+                            required */
     int k;               /* of GBT_QUERY_NEAREST, [1, 1e6]. Default 1 */
     double radius;       /* of GBT_QUERY_WITHIN and GBT_QUERY_OVERLAPPING, >= 0. Default 0 */
     uint32_t cookie_;    /* set by gbt_query_def_default() */
@@ -152,8 +152,8 @@ typedef struct gbt_query_def {
 gbt_query_def gbt_query_def_default(void);
 
 /**
- * Ask the balls of a file or folder, and print a line of CSV per answer: query, rank, ball, distance or t,
- * its centre and radius.
+ * Query the balls of a file or folder, and print one CSV line per answer: query, rank, ball, distance or t,
+ * and the ball's centre and radius.
  *
  * @param path [in] as gbt_balls_open()
  * @return as gbt_balls_open() and the queries

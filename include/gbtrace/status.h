@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gbtrace/status.h -- how every entry of the library reports failure.
+/* gbtrace/status.h -- how every function of the library reports failure.
 
-   A status says what kind of failure it was; an error adds one line for a person. Nothing in the library
-   exits; what it tells meanwhile goes to whoever gbtrace/progress.h names. */
+   A status is the kind of failure; an error adds one line of text. The library never exits the process; its
+   messages and progress go to the listener of gbtrace/progress.h. */
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 
@@ -17,7 +17,7 @@ typedef enum gbt_status {
     GBT_ERR_IO,          /* file system or device: exit code 4 */
     GBT_ERR_NO_MEMORY,   /* out of memory or over a stated limit: exit code 5 */
     GBT_ERR_INTERRUPTED, /* stopped by a signal after saving: exit code 130 */
-    GBT_ERR_INTERNAL     /* a library below us failed in a way that no input explains: exit code 1 */
+    GBT_ERR_INTERNAL     /* a library that gbtrace uses failed in a way that no input explains: exit code 1 */
 } gbt_status;
 
 /** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err =

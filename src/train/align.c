@@ -10,7 +10,8 @@
 enum { LEVELS = 3, STEPS = 75, LEAST_ACROSS = 60, MOST_PIXELS = 1 << 19 };
 static const double first_rate = 0.002, last_rate = 0.00003; /* radians */
 
-/* The loss of a view's picture from `camera`, as its exposure shows it: v->d_image. */
+/* Render a view from `camera`, compare it with the photo (through the photo's exposure), and put dL/drender
+   into v->d_image. */
 static gbt_status compare_view(trainer *t, step_view *v, size_t view, const gbt_camera *camera,
                                const unsigned char *photo_valid, gbt_error *err)
 {
@@ -36,7 +37,7 @@ static int finest_level(const trainer *t, size_t view)
     }
 }
 
-/* How many levels there are to go through, the finest last. */
+/* Number of image levels, coarse to fine, that the alignment goes through. */
 static int level_count(const trainer *t, size_t view, int finest)
 {
     int count = 1;

@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/align.h -- held-out photos, fitted into a scene that they are not in. */
+/* train/align.h -- align the poses of held-out photos with a scene that was trained without them. */
 #ifndef GBT_TRAIN_ALIGN_H
 #define GBT_TRAIN_ALIGN_H
 
 #include "train/trainer.h"
 
 /**
- * Where poses are learned, those of the held-out photos cannot be: their given poses are as wrong as the
- * others were, and the scene is not where these say. Each is brought, from its given pose, to where the
- * scene as it stands fits its photo best: six numbers of the camera, nothing of the scene. Small pictures
- * first.
+ * Align the pose of every held-out photo with the scene, by minimising the loss over the six numbers of its
+ * camera; the scene stays fixed. Coarse images come first.
  *
- * @return GBT_OK; GBT_ERR_INTERRUPTED at a signal (base/stop_signal.h): one photo is somewhere on its way
+ * Needed with learned poses: training moved scene and training cameras away from the given poses, which are
+ * as wrong for the held-out photos as they were for the others.
+ *
+ * @return GBT_OK; GBT_ERR_INTERRUPTED at a signal (base/stop_signal.h): the photo in hand then has an
+ * intermediate pose
  */
 gbt_status align_held_out(trainer *t, gbt_error *err);
 

@@ -4,8 +4,7 @@
 
 #include <math.h>
 
-/* What a pixel's ray costs, as a multiple of the loose rays' (rules.loose_rays): exact ones have twice the
-   hits. */
+/* Cost of a pixel's ray relative to a loose one (rules.loose_rays): exact rays have twice the hits. */
 static double hits_of_rays(const train_rules *rules, double progress)
 {
     return train_rules_are_loose(rules, progress) ? 1 : 2;
@@ -17,7 +16,7 @@ void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_re
     const double of_pixels = (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside;
     const double fixed = fmax(0, r->all.wall - of_pixels);
     const double hits = hits_of_rays(&t->rules, pace_progress(&t->pace, step));
-    /* So long a mean that the few steps that take long have the share in it that they have in the part. */
+    /* The mean covers so many steps that the few slow ones weigh in it as they do in the whole part. */
     const double part = (double)t->pace.steps[pace_segment(&t->pace, step)];
     const double rate = fmax(1 / (double)++s->steps, 1 / fmax(20, part / 4));
     s->fixed_seconds += rate * (fixed - s->fixed_seconds);
@@ -41,8 +40,8 @@ void budget_extend(trainer *t, const step_speed *s)
     const int part = t->pace.known;
     const double seconds = fmax(0, t->def.budget_seconds - t->seconds) / (PACE_SEGMENTS - part);
     const double per_step = s->steps > 0 ? expected_step(t, s, part) : 0;
-    /* Before anything has been measured: what the run's steps took before it was resumed, or a few steps, and
-       the rest of the first part's time goes to the next. */
+    /* Before anything has been measured: use the speed from before the run was resumed, or make a few steps;
+       the time that the first part leaves over goes to the next. */
     const double steps = per_step > 0  ? seconds / per_step
                          : t->step > 0 ? seconds * (double)t->step / t->seconds
                                        : 20.0 / t->def.views;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/camera_sees.c -- points on the picture. */
+/* train/camera_sees.c -- projection of points into the image, and whether they are inside it. */
 #include "train/camera_sees.h"
 
 #include <stddef.h>

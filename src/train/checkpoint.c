@@ -50,7 +50,7 @@ size_t checkpoint_array_bytes(const checkpoint_array *a)
     return a->dims[0] * a->dims[1] * (a->dtype == CONTAINER_F32 ? sizeof(float) : sizeof(double));
 }
 
-/* Anchors in the file, in the order of their sections. */
+/* Sets of anchor arrays in the file (values and Adam moments), in the order of their sections. */
 enum { ANCHOR_SETS = 3 };
 static const char *const anchor_set_names[ANCHOR_SETS] = {"anchors", "moment1", "moment2"};
 static const char *const network_set_names[ANCHOR_SETS] = {"networks", "networks.moment1",
@@ -69,7 +69,7 @@ static gbt_status read_anchors(const container *c, const char *prefix, size_t ro
                             err);
 }
 
-/* FNV-1a of what tells one data set from another: the names, sizes and centres of its views. */
+/* FNV-1a hash that identifies a data set: names, sizes and centres of its views. */
 static uint64_t hash_of_views(const trainer *t)
 {
     uint64_t hash = HASH_START;
@@ -84,7 +84,7 @@ static uint64_t hash_of_views(const trainer *t)
     return hash;
 }
 
-/* And of their lenses, directions and motions, and of the sparse points. */
+/* FNV-1a of the views' lenses, orientations and shutter motions, and of the sparse points. */
 static uint64_t hash_of_geometry(const trainer *t)
 {
     const scene_points *points = &t->scene.points;
@@ -173,8 +173,9 @@ gbt_status checkpoint_hash_photos(const scene *s, uint64_t *of_photos, uint64_t 
     return GBT_OK;
 }
 
-/* The old file under both names, so that one of the usual name is there whatever happens while the new one is
-   written. Where files cannot have two names it is moved: whoever resumes looks at PATH.prev next. */
+/* Give the old file a second name, PATH.prev (a hard link), so that PATH exists at every moment while the new
+   file is written. On file systems without hard links the file is renamed instead: resuming tries PATH.prev
+   next. */
 static gbt_status keep_previous(const char *path, gbt_error *err)
 {
     char previous[4096];

@@ -52,7 +52,8 @@ static bool set_key(const char *key, const char *value, gbt_train_def *d, config
 {
     if (strcmp(key, "data") == 0)
         return snprintf(strings->data, sizeof strings->data, "%s", value) < (int)sizeof strings->data;
-    if (strcmp(key, "start-level") == 0) /* in older files; a trained model does not depend on it */
+    if (strcmp(key, "start-level") == 0) /* an obsolete key in older files; a trained model does not depend on
+                                            it */
         return true;
     const gbt_train_setting *s = setting_find(key);
     return s != NULL && setting_read(s, value, &strings->texts, d);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/def.c -- the def of training: made, checked, and what 0 stands for in it. */
+/* train/def.c -- the definition struct of training: defaults, checks, and the values that 0 stands for. */
 #include "train/def.h"
 
 #include <math.h>
@@ -74,7 +74,8 @@ void train_def_warn_unused(const gbt_train_def *d)
                {"footprint", d->footprint, usual.footprint}};
     char names[256] = "";
     for (size_t i = 0; d->compat && i < sizeof own / sizeof *own; i++)
-        if (fabs(own[i].value - own[i].usual) > 0 && own[i].value != 0) /* 0: as a run's config says of it */
+        if (fabs(own[i].value - own[i].usual) > 0 && own[i].value != 0) /* 0 is what the config of a compat
+                                                                           run contains */
             snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s",
                      names[0] != '\0' ? ", " : "", own[i].name);
     if (names[0] != '\0')

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/event_records.c -- protobuf messages of TensorBoard, framed and summed up. */
+/* train/event_records.c -- TensorBoard's protobuf messages, framed with lengths and checksums. */
 #include "train/event_records.h"
 
 #include <stdbool.h>
@@ -11,11 +11,11 @@
 enum {
     FRAME_HEAD = 12,
     FRAME_TAIL = 4,
-    STEP_AT = 9, /* behind the wall time: a byte and a double */
+    STEP_AT = 9, /* offset after the wall time, which is a tag byte and a double */
     PNG_HEADER = 24
 };
 
-/* Of protobuf: how a field is written. */
+/* Protobuf wire types. */
 enum { WIRE_VARINT = 0, WIRE_DOUBLE = 1, WIRE_BYTES = 2, WIRE_FLOAT = 5 };
 
 static uint32_t masked_crc(const unsigned char *bytes, size_t count)
@@ -60,7 +60,7 @@ static void put_bytes(event_records *r, unsigned field, const void *bytes, size_
     put(r, bytes, count);
 }
 
-/* `inner` becomes a field of `r`, and empty. */
+/* Append `inner` to `r` as a field, and empty `inner`. */
 static void put_message(event_records *r, unsigned field, event_records *inner)
 {
     if (inner->status != GBT_OK)
@@ -69,8 +69,8 @@ static void put_message(event_records *r, unsigned field, event_records *inner)
     inner->count = 0;
 }
 
-/* The bytes of the machine are the bytes of the file: every processor that Debian has Embree for is
-   little-endian. */
+/* Numbers are written in the machine's byte order: every processor that Debian builds Embree for is
+   little-endian, as is the file. */
 static void begin_event(event_records *event, uint64_t step)
 {
     struct timespec now;
@@ -82,7 +82,7 @@ static void begin_event(event_records *event, uint64_t step)
     put_varint(event, step);
 }
 
-/* `event` goes into `r` with its frame, whole or not at all; freed. */
+/* Append `event` to `r` with its frame, completely or not at all, and free it. */
 static void end_event(event_records *r, event_records *event)
 {
     const uint64_t length = event->count;
@@ -166,7 +166,7 @@ void event_add_png(event_records *r, uint64_t step, const char *tag, const unsig
     event_records_free(&picture);
 }
 
-/* The step of an event that this file wrote; false for others. */
+/* Read the step of an event that this file wrote; false for any other event. */
 static bool read_step(const unsigned char *event, size_t count, uint64_t *step)
 {
     if (count < STEP_AT + 2 || event[0] != (1 << 3 | WIRE_DOUBLE) || event[STEP_AT] != (2 << 3 | WIRE_VARINT))

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/exposure.h -- a colour matrix per training photo, learned beside the scene: exposure and white
-   balance that differ.
+/* train/exposure.h -- a colour matrix per training photo, learned together with the scene, for photos that
+   differ in exposure and white balance.
 
-   The scene and the matrices can be traded against each other (a darker scene under brighter matrices), so
-   their mean over the photos is held at the identity: the scene has the photos' mean exposure. */
+   Scene and matrices are ambiguous: a darker scene with brighter matrices gives the same images. So the mean
+   of the matrices over the photos is held at the identity, and the scene has the mean exposure of the
+   photos. */
 #ifndef GBT_TRAIN_EXPOSURE_H
 #define GBT_TRAIN_EXPOSURE_H
 
@@ -15,22 +16,23 @@
 typedef struct exposures {
     size_t count;                      /* training photos; 0: exposure is not learned */
     float *matrix, *moment1, *moment2; /* [count][AFFINE_NUMBERS] */
-    uint64_t *visits;                  /* [count] Adam steps of each */
+    uint64_t *visits;                  /* [count] number of Adam steps of each photo */
 } exposures;
 
-/** `count` identities. */
+/** Set `count` matrices to the identity. */
 gbt_status exposures_make(exposures *e, size_t count, gbt_error *err);
 void exposures_free(exposures *e);
 
-/** One Adam step of photo `index`, then the mean of all back to the identity. `gradient` is finite. */
+/** One Adam step of photo `index`; then the mean of all matrices is set back to the identity. `gradient` must
+    be finite. */
 void exposures_step(exposures *e, size_t index, const double gradient[AFFINE_NUMBERS], double rate);
 
 /**
- * The learning rate: a photo is seen 1 / (count * step) times in a run, and must come from the identity to an
- * exposure two stops away.
+ * The learning rate, such that in a run of any length a matrix can get from the identity to an exposure two
+ * stops away. A photo is used 1 / (count * step) times in a run.
  *
  * @param progress [in] [0, 1]
- * @param step     [in] progress that one step makes
+ * @param step     [in] progress per step
  */
 double exposures_rate(size_t count, double progress, double step);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/exposure_spread.c -- the exposures of photos, by the colours of sparse points in them. */
+/* train/exposure_spread.c -- estimate the exposures of photos from the colours of the sparse points in
+   them. */
 #include "train/exposure_spread.h"
 
 #include <math.h>
@@ -11,7 +12,7 @@
 #include "train/camera_sees.h"
 
 enum { POINTS_ASKED = SCENE_SEEN_MAX, POINTS_MIN = 50 };
-static const float darkest = 0.04f, brightest = 0.96f; /* outside noise or clipping decides */
+static const float darkest = 0.04f, brightest = 0.96f; /* outside this range noise or clipping dominates */
 
 static bool is_exposed(const float rgb[3])
 {
@@ -21,7 +22,8 @@ static bool is_exposed(const float rgb[3])
     return rgb[0] + rgb[1] + rgb[2] > 3 * darkest;
 }
 
-/* log2 of how much brighter the photo is at the point; false where that says nothing. */
+/* log2 of (brightness of the photo at the point / brightness of the point); false when the comparison is not
+   meaningful. */
 static bool compare_at(const photos *p, size_t view, const gbt_camera *camera, size_t point, float *ratio)
 {
     const scene_points *points = &p->source->points;
@@ -40,7 +42,7 @@ static bool compare_at(const photos *p, size_t view, const gbt_camera *camera, s
     return true;
 }
 
-/* The median over the points; false where too few say something. */
+/* Exposure of a photo: the median over its points; false when too few points can be compared. */
 static bool exposure_of(const photos *p, size_t view, bool by_tracks, float *room, double *stops)
 {
     const gbt_camera camera = photos_camera(p, view, 0);

@@ -7,8 +7,8 @@
 #include "gbtrace/camera.h"
 
 /**
- * The smallest pixel with which any of the cameras sees each anchor: finer than that nothing is known about
- * it.
+ * The size of the smallest pixel that any of the cameras has at each anchor: the photos hold no finer detail
+ * of it.
  *
  * @param cameras [in]  [camera_count], at the size at which their photos were compared
  * @param out     [out] [a->count] scene-local units (trace/footprint.h); 0 for anchors that no camera sees

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/gradient_check.c -- look for gradients that would spoil the parameters for good. */
+/* train/gradient_check.c -- find gradients that would ruin the parameters permanently. */
 #include "train/gradient_check.h"
 
 #include <math.h>
@@ -11,7 +11,8 @@
 
 enum { ROW_BLOCK = 1024 };
 
-/* Written so that NaN is bad. Whole runs without a branch: the compiler makes vectors of them. */
+/* The comparison is written so that NaN counts as bad. No branch inside the loop, so that the compiler
+   vectorises it. */
 FASTEST_CLONE static bool any_bad(const float *values, size_t count)
 {
     int bad = 0;
@@ -30,8 +31,8 @@ static size_t first_bad(const float *values, size_t count)
 
 typedef struct row_job {
     const anchors *gradient;
-    const uint32_t *anchor; /* of each row that is looked at */
-    bool packed;            /* the gradient has these rows alone */
+    const uint32_t *anchor; /* of each row that is checked */
+    bool packed;            /* the gradient has only these rows */
     atomic_bool bad;
 } row_job;
 
@@ -47,7 +48,7 @@ static void check_rows(size_t block, size_t begin, size_t end, void *context)
     bool bad = false;
     for (size_t i = begin, next; i < end; i = next) {
         for (next = i + 1; next < end && (job->packed || job->anchor[next] == job->anchor[next - 1] + 1);)
-            next++; /* rows that follow each other in memory */
+            next++; /* extends a run of rows that are adjacent in memory */
         for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++) {
             const size_t width = anchors_width(job->gradient, f);
             bad |= any_bad(row_of(job, i, f, width), (next - i) * width);

@@ -7,16 +7,15 @@
 #include "image/affine.h"
 #include "train/learnables.h"
 
-/** Beyond this a gradient is as bad as one that is not a number: Adam's moments square it, and the square
-    must stay finite. */
+/** A larger gradient is treated like NaN: Adam squares it, and the square must stay finite. */
 #define GRADIENT_LIMIT 1e18f
 
 /**
- * Look at every gradient of the last frame_backward_anchors() of `f`: rows of the visible anchors, networks,
- * and the photo's exposure.
+ * Check every gradient of the last frame_backward_anchors() of `f`: the rows of the visible anchors, the
+ * networks, and the photo's exposure.
  *
- * @param g        [in]  a row for each anchor, or for each visible one, as frame_backward_anchors() has it
- * @param exposure [in]  [12] gradient of the photo's colour matrix, NULL without
+ * @param g        [in]  a row for each anchor or for each visible one, as in frame_backward_anchors()
+ * @param exposure [in]  [12] gradient of the photo's colour matrix; NULL when there is none
  * @param where    [out] "feature of anchor 17, value 3", "shape network, value 200": the first bad one, in
  *                       the order feature, offset, scale, opacity, shape and colour network, exposure;
  *                       untouched when all are good

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/growing.c -- the rounds of a run: when, with which thresholds, at which sparse points; and what
-   follows the anchors. */
+/* train/growing.c -- the growth rounds of a run: their times, thresholds and sparse-point candidates, and the
+   arrays that must follow when rows of anchors are added or removed. */
 #include "train/growing.h"
 
 #include <math.h>
@@ -16,18 +16,19 @@
 #include "train/near_distance.h"
 #include "train/scale_limit.h"
 
-static const float share_min = 2.5e-6f;     /* of short runs: schedule_threshold_factor() */
-static const double last_rounds_from = 0.9; /* of growing */
-#define PROGRESS_ROUNDING 1e-10             /* far below a step */
+static const float share_min = 2.5e-6f;     /* pruning threshold of short runs; scaled by
+                                               schedule_threshold_factor() */
+static const double last_rounds_from = 0.9; /* as a fraction of the growing period */
+#define PROGRESS_ROUNDING 1e-10             /* far below the progress of a step */
 enum {
     ROUNDS_PER_RUN = 100,
-    ROUND_INTERVAL = 100 /* steps, where rounds do not go by progress */,
-    INTERVAL_MIN = 20 /* views: a judgement of fewer views is chance */,
-    INTERVAL_MAX = 100 /* and more than these tell nothing new */
+    ROUND_INTERVAL = 100 /* steps, when rounds do not follow progress */,
+    INTERVAL_MIN = 20 /* views: fewer give a statistically unreliable decision */,
+    INTERVAL_MAX = 100 /* views: more add no information */
 };
 enum { VIEWS_MIN = 2 };
 
-/* Is `step` one of those from `from` to the end of growth, and may geometry change? */
+/* Is `step` between `from` and the end of growth, at a time when geometry may change? */
 static bool is_within(const trainer *t, uint64_t step, double from)
 {
     const double progress = train_rules_progress(&t->rules, &t->pace, step);
@@ -76,16 +77,16 @@ static gbt_status follow_creation(trainer *t, const growth_result *result, gbt_e
     return GBT_OK;
 }
 
-/* What find_points() makes; owned. */
+/* Output of find_points(); owned. */
 typedef struct known_points {
     uint32_t *nearest; /* [points]: anchor */
     float *scale;      /* [points] in the first round */
 } known_points;
 
-/* The sparse points are known surface, and a start from balls has left most of them out: where the nearest
-   anchor asks for more, they are candidates. Gaussians are not enough, for they are where anchors are. In the
-   first round they make good what the start lacks, as a start would; after it they are asked for and sized as
-   Gaussians are. */
+/* Sparse points lie on known surface, and a start from balls leaves most of them out. So a point is a growth
+   candidate where the gradient of its nearest anchor is large; Gaussians alone are not enough as candidates,
+   because they only exist near anchors. In the first round points add what the start left out, with the
+   scales of a start; later their threshold and size are those of Gaussian candidates. */
 static gbt_status find_points(const trainer *t, known_points *known, growth_points *out, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
@@ -102,7 +103,7 @@ static gbt_status find_points(const trainer *t, known_points *known, growth_poin
                                            t->first_scale_max, known->scale, err));
     }
     if (t->anchors.count == 0)
-        return GBT_OK; /* nothing that could ask for more */
+        return GBT_OK; /* no anchor whose gradient could ask for more */
     GBT_TRY(points_find_nearest(t->anchors.position, t->anchors.count, points->position, points->count,
                                 known->nearest, NULL, err));
     *out = (growth_points){.count = points->count,
@@ -113,8 +114,8 @@ static gbt_status find_points(const trainer *t, known_points *known, growth_poin
     return GBT_OK;
 }
 
-/* One photo cannot tell how far off something is: what only it shows may stand anywhere along its rays, as a
-   floater before other cameras. */
+/* A single photo does not determine depth: an anchor that only one photo sees may be anywhere along its rays,
+   and be a floater in front of other cameras. */
 static bool two_views_see(const void *context, const float position[3])
 {
     const trainer *t = context;
@@ -146,7 +147,7 @@ static growth_def def_of(const trainer *t)
     def.interval = growing_interval(t);
     if (!t->rules.thresholds_by_length)
         return def;
-    /* What is left out is missed, so gradients and shares of the picture are larger. */
+    /* When anchors are left out, the others have larger gradients and larger shares of the image. */
     const float shown = 1 - t->left_out,
                 factor = (float)t->def.threshold_factor / (shown * shown) *
                          schedule_threshold_factor(t->def.views * pace_expected(&t->pace, t->step));
@@ -175,7 +176,7 @@ static void follow_one(size_t block, size_t begin, size_t end, void *context)
     job->status[block] = learnables_follow(job->of[block], job->result, &job->error[block]);
 }
 
-/* What is kept of each anchor beside it. */
+/* All per-anchor arrays besides the anchors themselves. */
 static gbt_status follow_all(trainer *t, const growth_result *result, gbt_error *err)
 {
     follow_job job = {.result = result, .of = {&t->gradient, &t->moment1, &t->moment2}};

@@ -30,13 +30,14 @@ gbt_status held_out_psnr(trainer *t, double *psnr, gbt_error *err)
         if (status == GBT_OK)
             status = image_score_photo(&t->views[0].frame.rgb, &photo, valid, t->exposures.count > 0, NULL,
                                        &scores, err);
-        if (status == GBT_OK && isfinite(scores.psnr)) { /* else every pixel is masked */
+        if (status == GBT_OK && isfinite(scores.psnr)) { /* otherwise every pixel is masked */
             sum += scores.psnr;
             count++;
         }
         image_free(&photo);
     }
-    for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* files are to have no other */
+    for (size_t i = 0; t->poses.count > 0 && i < t->scene.view_count; i++) /* aligned poses must not get into
+                                                                              files */
         if (t->scene.views[i].is_test)
             t->scene.views[i].camera = t->poses.given[i];
     *psnr = count > 0 ? sum / (double)count : (double)NAN;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/learnables.c -- the table of what learns, and Adam over it. */
+/* train/learnables.c -- learning rates of all parameters, listed in a table, and Adam over them. */
 #include "train/learnables.h"
 
 #include <math.h>
@@ -16,16 +16,17 @@
 enum { ADAM_BLOCK = 256 };
 
 typedef struct rate_rule {
-    double first, last; /* of the reference: log-linear from one to the other over the run */
-    double own;         /* ours is so many times that */
+    double first, last; /* the reference's rates, log-linear from first to last over the run */
+    double own;         /* factor of our rate over the reference's */
     bool times_extent;  /* the reference's is proportional to the extent of the cameras */
     bool ages_with_run; /* Adam's bias is corrected by the age of the run, not of the anchor */
-    bool is_log_scale;  /* kept between scale_log_min and the anchor's scale_log_max */
+    bool is_log_scale;  /* clamped between scale_log_min and the anchor's scale_log_max */
 } rate_rule;
 
-/* By the age of the run, the first steps of a new anchor would be up to six times too long, for its second
-   moments are young: offsets and scales, which begin about right, would overshoot. Features begin as those of
-   others and have far to go: they keep that. */
+/* Bias correction by the age of the run would make the first steps of a new anchor up to six times too long,
+   because its second moments are still near 0. Offsets and scales start near their final values and would
+   overshoot, so they use the anchor's age. Features are copied from other anchors and have far to go, so they
+   use the age of the run. */
 static const rate_rule anchor_rules[ANCHOR_FIELDS] = {
     [ANCHOR_FEATURE] = {.first = 0.0075, .last = 0.0075, .own = 1.5, .ages_with_run = true},
     [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own = 4.5, .times_extent = true},
@@ -110,7 +111,7 @@ typedef struct anchor_job {
     uint64_t age; /* of the run */
 } anchor_job;
 
-/* `most` of each row; `least` wins. */
+/* Clamp rows to [least, most of the row]; `least` wins. */
 FASTEST_CLONE static void keep_between(float *values, size_t rows, size_t width, float least,
                                        const float *most)
 {
@@ -119,7 +120,7 @@ FASTEST_CLONE static void keep_between(float *values, size_t rows, size_t width,
             values[i] = larger(smaller(values[i], most[r]), least);
 }
 
-/* Rows [begin, end), all of one age. */
+/* Adam step of rows [begin, end), which all have the same age. */
 static void learn_rows(const anchor_job *job, size_t begin, size_t end)
 {
     const learning_model *m = job->m;

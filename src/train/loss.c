@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 
 static const float dssim_weight = (float)IMAGE_DSSIM_WEIGHT;
-static const double volume_weight_at_6 = 0.01; /* in scenes whose cameras are 6 units from what they see */
+static const double volume_weight_at_6 = 0.01; /* for scenes whose cameras are 6 units from what they see */
 
 /* ---- of the picture ---- */
 

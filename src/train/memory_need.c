@@ -13,8 +13,8 @@
 static const double program_bytes = 150e6, least_bytes = 168e6, raw_point_bytes = 36 + 24, point_bytes = 24,
                     tree_bytes = 100, tree_fixed_bytes = 95, learning_point_bytes = 3000,
                     model_point_bytes = 600, step_pixel_bytes = 300, score_pixel_bytes = 120;
-static const double saved_point_bytes = 952; /* of the copy that a save beside the steps is written from */
-static const double found_points = 20000,    /* by photo consistency, where the data set has none */
+static const double saved_point_bytes = 952; /* of the copy that a background save writes from */
+static const double found_points = 20000,    /* by photo consistency, when the data set has none */
     most_points = 131072; /* the tree of balls is 18 deep: more points make no more anchors */
 
 memory_need memory_need_of(const scene *s, double downscale, const train_rules *rules)
@@ -51,7 +51,7 @@ memory_need memory_need_of(const scene *s, double downscale, const train_rules *
                  stepping = need.points + need.photos + need.anchors + fmax(need.view, decoded);
     need.whole = fmax(need.program + fmax(scoring, fmax(starting, stepping)), least_bytes);
     need.least = fmin(need.whole, 16.0 / 15 * (need.program + fmax(tree_fixed_bytes * points, need.view)));
-    /* Memory is let go of down to 5/8 of the limit (base/paged.h), not while a photo is decoded. */
+    /* Memory is paged out down to 5/8 of the limit (base/paged.h), but not while a photo is decoded. */
     need.least = fmax(need.least, fmax(8.0 / 3 * decoded, least_bytes));
     need.whole = fmax(need.whole, need.least);
     return need;

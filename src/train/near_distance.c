@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/near_distance.c -- near distances by the sparse points that photos show. */
+/* train/near_distance.c -- near distances from the depths of sparse points in the photos. */
 #include "train/near_distance.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "train/rules.h"
 
-enum { NEARER_VIEWS = 20 /* one in so many may be nearer to things */ };
+enum { NEARER_VIEWS = 20 /* one view in this many may be nearer to the scene */ };
 
 float near_of_view(float t_near, const gbt_train_def *def, const scene_view *view)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/old_run.c -- what an older run left in the folder of one that starts anew. */
+/* train/old_run.c -- remove the files of an older run from the folder of a new one. */
 #include "train/old_run.h"
 
 #include <dirent.h>
@@ -35,7 +35,7 @@ static bool is_picture(const char *name)
     return length > 4 && strcmp(name + length - 4, ".png") == 0;
 }
 
-/* Of held-out views, of which the new run may have others. */
+/* Images of held-out views: the new run may hold out other views. */
 static gbt_status remove_pictures(const char *run, gbt_error *err)
 {
     char folder[OLD_PATH_SIZE];

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photo_pick.c -- bytes of a photo to floats, every n-th pixel in both directions. */
+/* train/photo_pick.c -- every n-th pixel of a photo in both directions, converted from bytes to floats. */
 #include "train/photo_pick.h"
 
 #include "base/parallel.h"
 
-enum { PICK_ROWS = 32 /* of one thread at a time */ };
+enum { PICK_ROWS = 32 /* rows per block of work */ };
 
 typedef struct pick_job {
     const unsigned char *bytes, *transparency;
@@ -34,7 +34,7 @@ static void pick_rows(size_t block, size_t begin, size_t end, void *context)
         const size_t first = job->first + y * job->step * job->row;
         const unsigned char *from = job->bytes + 3 * first;
         float *to = job->out->pixels + 3 * y * width;
-        if (job->step == 1) { /* one run, of which the compiler makes vectors */
+        if (job->step == 1) { /* contiguous pixels: the compiler vectorises this loop */
             for (size_t i = 0; i < 3 * width; i++)
                 to[i] = (float)from[i] * (1.0f / 255);
         } else {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photos.c -- training photos, kept as bytes. */
+/* train/photos.c -- training photos, stored as bytes. */
 #include "train/photos.h"
 
 #include <math.h>
@@ -17,8 +17,8 @@
 #include "train/photo_pick.h"
 
 enum { USUAL_WIDTH = 1600 /* as in 3DGS */ };
-/* Of a stored pixel: its floats and its samples, or its floats at two sizes; with alpha or a mask both of
-   these. And of an EXR file, whose samples are floats. */
+/* Peak bytes per pixel while a photo is decoded: floats and file samples, or floats at two sizes; more with
+   alpha or a mask. The second number is for EXR files, whose samples are floats. */
 static const double decoded_pixel_bytes[2] = {24, 40}, decoded_alpha_bytes[2] = {40, 56};
 
 static double median(float *values, size_t count)
@@ -35,7 +35,7 @@ gbt_status photos_downscale_to(const scene *s, double width, double *downscale, 
     float *widths = mem_alloc(2 * s->view_count, sizeof *widths, "photo widths", err);
     if (widths == NULL)
         return GBT_ERR_NO_MEMORY;
-    float *ratios = widths + s->view_count; /* of the cameras' widths to them */
+    float *ratios = widths + s->view_count; /* camera width / photo width */
     for (size_t i = 0; i < s->view_count; i++) {
         const scene_view *view = &s->views[i];
         image_header h = {.width = view->photo_width};
@@ -62,7 +62,7 @@ gbt_status photos_result_downscale(const scene *s, int width, int reduced, doubl
     return GBT_OK;
 }
 
-/* One `part`-th of the memory that is free. Nothing but time depends on it. */
+/* A fraction 1 / `part` of the free memory. It affects speed only, never results. */
 static size_t free_share(size_t part)
 {
     const machine m = machine_read("");
@@ -157,7 +157,7 @@ static size_t pixel_count(const photos *p, size_t view)
     return (size_t)camera.width * (size_t)camera.height;
 }
 
-/* With its marks and how transparent it is; at most, before it was read. */
+/* Bytes of a photo with its mask and transparency; an upper bound before it was read. */
 static size_t full_bytes(const photos *p, size_t view)
 {
     const scene_view *v = &p->source->views[view];
@@ -183,7 +183,7 @@ static void drop_kept_until_next(photos *p)
     p->kept_until_next = SIZE_MAX;
 }
 
-/* Into p->full, and what goes with it. */
+/* Read a photo into p->full, with its mask and transparency. */
 static gbt_status read_into(photos *p, size_t view, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, 0);
@@ -200,8 +200,8 @@ static gbt_status read_into(photos *p, size_t view, gbt_error *err)
     return status;
 }
 
-/* Views come in random order, each as often as any other: the first that were read stay, for whatever else
-   stayed would be asked for no sooner. */
+/* Views are used equally often and in random order, so no photo is more useful to keep than another: those
+   read first stay. */
 gbt_status photos_read_full(photos *p, size_t view, gbt_error *err)
 {
     if (p->full[view] != NULL)
@@ -224,7 +224,7 @@ typedef struct load_job {
     const size_t *views;
     size_t count, at_once;
     read_one *one;
-    gbt_status *status; /* of each */
+    gbt_status *status; /* one per photo */
     gbt_error *error;
 } load_job;
 
@@ -245,7 +245,7 @@ static gbt_status try_one(photos *p, size_t view, gbt_error *err)
     return status;
 }
 
-/* As many blocks as photos that may be decoded at once. */
+/* There are as many blocks as photos that may be decoded at the same time. */
 static void read_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)begin;
@@ -257,7 +257,7 @@ static void read_block(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The first failure in the order of the views. */
+/* Run `one` for all views; reports the first failure in the order of the views. */
 static gbt_status run_all(photos *p, const size_t *views, size_t count, read_one *one, gbt_error *err)
 {
     load_job job = {.photos = p,
@@ -278,7 +278,7 @@ static gbt_status run_all(photos *p, const size_t *views, size_t count, read_one
     return status;
 }
 
-/* How many of them, from the first on, may be kept beside those that are. */
+/* How many of `views`, from the first on, fit in memory in addition to the photos already kept. */
 static size_t count_fitting(const photos *p, const size_t *views, size_t count)
 {
     size_t fitting = 0;
@@ -322,7 +322,7 @@ gbt_status photos_any_valid(photos *p, const size_t *views, size_t count, bool *
     return GBT_OK;
 }
 
-/* A photo at a level above 0, and its marks: p->some_valid. */
+/* A photo at a level above 0, with its mask in p->some_valid. */
 static gbt_status get_smaller(photos *p, size_t view, int level, image *out, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(p, view, level);

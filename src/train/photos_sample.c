@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/photos_sample.c -- the pixels of a photo that a training step looks at, and their camera. */
+/* train/photos_sample.c -- the pixels of a photo that a training step uses, and their camera. */
 #include "base/fail.h"
 #include "base/memory.h"
 #include "train/photos.h"

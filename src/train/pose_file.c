@@ -53,8 +53,8 @@ static bool get_numbers(const json_t *array, size_t count, double *out)
     return fine;
 }
 
-/* By the name that pose_file_write() gave it. `place`: where to look first, which becomes the place behind
-   it: the file mostly has the order of the views. */
+/* Find a view by the name that pose_file_write() gave it. The search starts at `place`, which is then set
+   after the view found: the file is usually in the order of the views. */
 static scene_view *find_view(const scene *s, const json_t *name, size_t *place)
 {
     for (size_t k = 0; k < s->view_count; k++) {

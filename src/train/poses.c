@@ -63,7 +63,7 @@ bool pose_is_finite(const double gradient[POSE_NUMBERS])
     return sum <= (double)GRADIENT_LIMIT;
 }
 
-/* The same motion, of the world's axes, for another camera. */
+/* Move a camera by a motion given in world axes. */
 static void move_by(gbt_camera *camera, const double move[3], const double turn[3])
 {
     double motion[POSE_NUMBERS];
@@ -92,10 +92,11 @@ void poses_step(poses *p, scene *s, const size_t *train_views, size_t index,
 
 double poses_rate(size_t count, double progress, double step)
 {
-    const double begin = 0.03, way = 0.04, most = 0.002, last = 0.05, mean = 0.32; /* of last^progress */
+    const double begin = 0.03, way = 0.04, most = 0.002, last = 0.05, mean = 0.32; /* mean of last^progress
+                                                                                      over a run */
     if (progress < begin)
         return 0;
-    const double cool = fmin((1 - progress) / (1 - SCHEDULE_COOL_FROM), 1); /* as all rates */
+    const double cool = fmin((1 - progress) / (1 - SCHEDULE_COOL_FROM), 1); /* like all learning rates */
     return fmin(way / mean * (double)count * step, most) * exp(progress * log(last)) * fmax(cool, 0);
 }
 
@@ -117,7 +118,7 @@ void poses_unpack(const poses *p, scene *s)
     }
 }
 
-/* Of the turn from one camera to another. */
+/* Angle of the rotation from one camera to another. */
 static double angle_between(const gbt_camera *a, const gbt_camera *b)
 {
     double square = 0; /* |A - B|^2 = 8 sin^2(angle / 2) */

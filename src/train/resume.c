@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/resume.c -- go on with a run. */
+/* train/resume.c -- continue a run from its checkpoint. */
 #include "train/resume.h"
 
 #include <errno.h>
@@ -22,22 +22,22 @@ gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err)
     if (!file_exists(latest) || !file_exists(previous) ||
         checkpoint_config(latest, config, sizeof config, &why) != GBT_ERR_FORMAT ||
         checkpoint_config(previous, config, sizeof config, NULL) != GBT_OK)
-        return GBT_OK; /* resume_open() says what is wrong, if anything is */
+        return GBT_OK; /* resume_open() reports the error, if there is one */
     log_warn("%s; going on from %s", why.text, previous);
     if (rename(previous, latest) != 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot be named %s: %s", previous, latest, strerror(errno));
     return GBT_OK;
 }
 
-/* The length of the run is asked for on purpose: change_length() takes it. */
+/* Settings of the run's length: they may change on --resume (change_length()). */
 static bool is_length(const gbt_train_setting *s)
 {
     return s->offset == offsetof(gbt_train_def, iterations) ||
            s->offset == offsetof(gbt_train_def, budget_seconds);
 }
 
-/* Settings that were asked for, which is what differs from the default, and that the run does not have.
-   `saved` is settled. */
+/* Warn about settings that were asked for (those that differ from the default) and differ from the run's own.
+   `saved` has been through train_def_settle(). */
 static void warn_of_differences(const gbt_train_def *asked, const gbt_train_def *saved)
 {
     const gbt_train_def usual = gbt_train_def_default();
@@ -67,8 +67,8 @@ static gbt_status open_data(trainer *t, const char *data, const char *run, const
     return trainer_open(t, data, def, err);
 }
 
-/* The schedule of a budget of which t->seconds are spent: these were its first parts, the others are found as
-   the run goes on. */
+/* The pace of a budget of which t->seconds are spent: the steps done so far were its first parts; the
+   remaining parts are decided during the run. */
 static pace pace_of_time_spent(const trainer *t, double budget_seconds)
 {
     const int parts =
@@ -79,7 +79,7 @@ static pace pace_of_time_spent(const trainer *t, double budget_seconds)
     return p;
 }
 
-/* Only what is gathered from here on is counted by the new schedule; 0 is a run before its first round. */
+/* The new schedule counts only statistics gathered from here on; 0 is a run before its first round. */
 static void change_pace(trainer *t, pace p)
 {
     t->pace = p;
@@ -134,13 +134,15 @@ gbt_status resume_open(trainer *t, const char *data, const char *run, const char
     GBT_TRY(train_def_check(def, err));
     GBT_TRY(checkpoint_config(path, config, sizeof config, err));
     gbt_train_def saved = *def;
-    for (size_t i = 0; i < gbt_train_setting_count(); i++) /* it says nothing of some that it left alone */
+    for (size_t i = 0; i < gbt_train_setting_count(); i++) /* the config leaves out some settings with default
+                                                              values */
         if (gbt_train_setting_at(i)->saved)
             setting_set_default(gbt_train_setting_at(i), &saved);
     GBT_TRY(config_parse(config, path, &saved, strings, err));
-    saved.lossless = saved.lossless || def->lossless; /* of the file, not of what is trained */
+    saved.lossless = saved.lossless || def->lossless; /* affects the model file, not training */
     warn_of_differences(def, &saved);
-    const char *named = saved.eval_split; /* which its files say, wherever the list is now */
+    const char *named = saved.eval_split; /* the list in the run's own files, wherever the original list is
+                                             now */
     char split[RUN_SPLIT_TEXT_SIZE];
     GBT_TRY(run_split_text(run, named, split, err));
     saved.eval_split = split;

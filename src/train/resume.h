@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/resume.h -- go on with a run: its settings and data, its state, another length. */
+/* train/resume.h -- continue a run: load its settings, data and state, and optionally change its length. */
 #ifndef GBT_TRAIN_RESUME_H
 #define GBT_TRAIN_RESUME_H
 
 #include "train/config.h"
 #include "train/trainer.h"
 
-/** A damaged checkpoint makes room for the whole one before it: the next save would put it in the place of
-    that. Of the first process, before any opens the run. GBT_OK or GBT_ERR_IO. */
+/** Replace a damaged checkpoint by the intact previous one; otherwise the next save would keep the damaged
+    one as the previous one. Called by the first process before any process opens the run. GBT_OK or
+    GBT_ERR_IO. */
 gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err);
 
 /**
- * Make of `t` what it was when the run's last checkpoint was made.
+ * Restore `t` to the state of the run's last checkpoint.
  *
- * Settings come from the checkpoint; what `def` asks for beside is warned of. Only the length may change:
- * `def->iterations`, else `def->budget_seconds`, where it is neither 0 nor the run's own; a run by a pace
- * keeps that when `def` has a pace, too. The schedule then goes on where a run of that length would be after
- * as many steps, or after as much time.
+ * Settings come from the checkpoint; other settings in `def` cause a warning. Only the length may change: to
+ * `def->iterations`, or else to `def->budget_seconds`, if it is neither 0 nor the run's own; a run with a
+ * pace keeps it when `def` has a pace, too. The schedule then continues where a run of that length would be
+ * after the same number of steps, or after the same time.
  *
- * @param data     [in] the data set; NULL: where the run has it
- * @param latest   [in] the checkpoint; where it is missing, `previous`
- * @param def      [in] as gbt_train() was given it; says how much memory may be used, and when
- *                      checkpoints are made
- * @param strings  [out] keeps strings of t->def, for as long as `t` lives
+ * @param data     [in] the data set; NULL: where the run's files say it is
+ * @param latest   [in] the checkpoint; if it is missing, `previous` is used
+ * @param def      [in] argument of gbt_train(); its memory limit and checkpoint interval apply
+ * @param strings  [out] storage for strings of t->def; must live as long as `t`
  * @return GBT_OK; GBT_ERR_ARGUMENT: a length that the run has passed already; GBT_ERR_IO: no data, no
  *         checkpoint; GBT_ERR_FORMAT: a damaged checkpoint, other data
  */

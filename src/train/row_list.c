@@ -46,10 +46,11 @@ typedef struct sum_job {
     const row_list *const *lists;
     size_t count;
     row_list *out;
-    size_t *first; /* [blocks]: rows of the sum in a block of numbers; then where they begin */
+    size_t *first; /* [blocks]: number of rows of the sum per block of numbers; later the index of each
+                      block's first row */
 } sum_job;
 
-/* A walk over the numbers of one block, in all lists at once. */
+/* A simultaneous walk through all lists over the row numbers of one block (a merge). */
 typedef struct walk {
     const sum_job *job;
     size_t at[LISTS_MAX], end[LISTS_MAX];
@@ -66,7 +67,7 @@ static walk walk_of(const sum_job *job, size_t begin, size_t end)
     return w;
 }
 
-/* The least number that a list has next; false: none has any. */
+/* Advance to the smallest next row number of all lists; false at the end. */
 static bool walk_next(walk *w)
 {
     bool found = false;
@@ -102,8 +103,8 @@ static void count_block(size_t block, size_t begin, size_t end, void *context)
     job->first[block] = count;
 }
 
-/* The sum of the rows with the walk's number in `size` lists from `list` on; NULL: none has one. `scratch`
-   has a row for each sum of the tree, `node` is this one's. */
+/* Sum of the rows with the walk's current number over `size` lists from `list` on; NULL when none of them has
+   such a row. `scratch` has a row for each node of the summation tree; `node` is this one's. */
 static const row_word *sum_rows(const walk *w, size_t list, size_t size, row_word *scratch, size_t node)
 {
     const size_t words = 1 + w->job->out->width;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/row_list.h -- numbered rows of floats, those that are not all zero: what one view of a step, or
-   several together, say of the anchors that they saw. */
+/* train/row_list.h -- a sparse matrix as a list of its nonzero rows: the gradients and statistics of the
+   anchors that one view of a step, or several views together, saw. */
 #ifndef GBT_TRAIN_ROW_LIST_H
 #define GBT_TRAIN_ROW_LIST_H
 
@@ -21,22 +21,22 @@ typedef struct row_list {
     size_t capacity;     /* words */
 } row_list;
 
-/** Makes room for `count` rows, whose words are not set. */
+/** Resize to `count` rows with uninitialised contents. */
 gbt_status row_list_resize(row_list *l, size_t count, size_t width, gbt_error *err);
 void row_list_free(row_list *l);
 
 static inline row_word *row_list_row(const row_list *l, size_t i) { return l->words + i * (1 + l->width); }
 
-/** How many rows have a number below `number`. */
+/** Number of rows with a row number below `number`. */
 size_t row_list_find(const row_list *l, uint32_t number);
 
 /**
- * The sum of `count` lists, a power of two up to 64, by a binary tree over them: (0 + 1) + (2 + 3) ... A
- * row that a list lacks is zero there, so summing blocks of lists that begin at multiples of their size, and
- * then the sums, gives the same bits.
+ * The sum of `count` lists, a power of two up to 64, by a binary tree over them: (0 + 1) + (2 + 3) ... A row
+ * missing from a list is zero. Because the tree is fixed, summing aligned blocks of lists first (size a power
+ * of two, start a multiple of it), and then the block sums, gives the same bits.
  *
- * @param lists [in]  of one width; borrowed
- * @param out   [out] a row for every number that any list has
+ * @param lists [in]  all of the same width; borrowed
+ * @param out   [out] has a row for every number that occurs in any list
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: parallel inside, same bits for every number.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/rules.c -- our rules, and the reference's. */
+/* train/rules.c -- the values of train_rules for our method and for the reference. */
 #include "train/rules.h"
 
 #include <math.h>
@@ -11,8 +11,8 @@ static train_rules own_rules(const gbt_train_def *def)
 {
     const double geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0;
     return (train_rules){
-        .offsets = 2,           /* fewer than in the paper's base: at equal time the models are better */
-        .ball_scale_factor = 2, /* the balls' scale prior is smaller than their spacing */
+        .offsets = 2,           /* fewer than in the reference: better models at equal time */
+        .ball_scale_factor = 2, /* the ball prior gives scales below the spacing of the balls */
         .spacing_scale_factor = TRAIN_SPACING_SCALE,
         .uses_footprint = true,
         .recentres = true,
@@ -50,7 +50,7 @@ static train_rules own_rules(const gbt_train_def *def)
     };
 }
 
-/* Everything that is not named is false or 0. */
+/* Rules that are not named here are false or 0. */
 static train_rules reference_rules(void)
 {
     return (train_rules){

@@ -33,7 +33,8 @@ void gbt_set_threads(int threads) { parallel_set_threads(threads); }
 gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err)
 {
     paged_stop();
-    return bytes > 0 ? paged_start(folder, bytes / 8 * 5, err) : GBT_OK; /* the rest is for what must stay */
+    return bytes > 0 ? paged_start(folder, bytes / 8 * 5, err) : GBT_OK; /* the rest is for memory that cannot
+                                                                            be paged out */
 }
 
 gbt_status gbt_hold_run(const char *run, int *hold, gbt_error *err)
@@ -92,7 +93,7 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
 
 /* ---- the loop ---- */
 
-/* Of a whole run: the last poses of the photos, and what became of them. */
+/* At the end of a run: align the held-out photos, and report how far the poses moved. */
 static gbt_status finish_poses(trainer *t, gbt_error *err)
 {
     double angle, distance;
@@ -116,7 +117,7 @@ static gbt_status evaluate_in_passing(trainer *t, run_log *log, gbt_error *err)
 /* What the first process does between steps. */
 typedef struct run_clock {
     step_speed measured;
-    double begin, offset, paused, last_save; /* seconds; offset: of the runs before */
+    double begin, offset, paused, last_save; /* seconds; offset: training time before the run was resumed */
     int next_eval;
     save_beside *saving;
 } run_clock;
@@ -133,11 +134,11 @@ static run_clock clock_start(const trainer *t, const run_log *log, save_beside *
                  "out: %d",
                  t->seconds, c.next_eval);
     else if (c.next_eval > 0 && at[c.next_eval - 1] > scored)
-        c.next_eval--; /* a signal came before that score, or in it */
+        c.next_eval--; /* a signal came before or during that evaluation */
     return c;
 }
 
-/* A run that took more than it may ends, saved: with more memory it goes on. */
+/* A run over its memory limit is saved and ends; it can be resumed with more memory. */
 static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *err)
 {
     const size_t peak = t->def.memory > 0 ? mem_peak_bytes() : 0;
@@ -151,10 +152,11 @@ static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *er
         paths->checkpoint);
 }
 
-/* A photo that cannot be read any longer, or steps that teach nothing: what has been learned is good. */
+/* Failures caused by the data (an unreadable photo, non-finite steps): what was learned so far is still
+   good. */
 static bool is_of_data(gbt_status status) { return status == GBT_ERR_FORMAT || status == GBT_ERR_IO; }
 
-/* A run that fails because of `why`: where that is of the data it ends saved. */
+/* End a failed run; it is saved first if the data caused the failure. */
 static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *saving, gbt_status status,
                              const gbt_error *why, gbt_error *err)
 {
@@ -166,7 +168,7 @@ static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *sa
     return base_fail(err, status, "%s", why->text);
 }
 
-/* Wait for a save beside the steps. False: it failed, and all is to be saved as it is now. */
+/* Wait for a background save. False when it failed; then the present state must be saved. */
 static bool end_saving(save_beside *saving)
 {
     gbt_error why = {0};
@@ -193,7 +195,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         const double before = clock_wall();
         gbt_error why = {0};
         const gbt_status status = evaluate_in_passing(t, log, &why);
-        stop = status == GBT_ERR_INTERRUPTED; /* and saved below */
+        stop = status == GBT_ERR_INTERRUPTED; /* saved below */
         if (status != GBT_OK && !stop)
             return end_failed(t, paths, c->saving, status, &why, err);
         c->paused += clock_wall() - before;
@@ -204,7 +206,8 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
                      !save_is_under_way(c->saving);
     if (stop || due || failed) {
         end_saving(c->saving);
-        const bool at_once = stop || failed || def->memory > 0; /* a copy is memory, too */
+        const bool at_once = stop || failed || def->memory > 0; /* no background save under a memory limit: it
+                                                                   needs a copy */
         GBT_TRY(at_once ? save_surely(t, paths, err) : save_begin(c->saving, t, paths, err));
         c->last_save = t->seconds;
         if (stop)
@@ -233,7 +236,8 @@ static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *sav
         gbt_status status = trainer_step(t, &report, &why);
         if (status != GBT_OK) {
             end_failed(t, paths, saving, status, &why, err);
-            return is_of_data(status) ? cluster_follow(status, err) : status; /* all know of these */
+            return is_of_data(status) ? cluster_follow(status, err) : status; /* every process sees other
+                                                                                 failures by itself */
         }
         paged_check();
         status = cluster_leads() ? follow_step(t, &report, &c, paths, log, err) : GBT_OK;
@@ -245,13 +249,13 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
                                const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
     const double begin = clock_wall();
-    if (def->memory > 0 && !cluster_leads()) /* which has done so already */
+    if (def->memory > 0 && !cluster_leads()) /* the first process has already done so */
         GBT_TRY(gbt_set_memory(def->memory, run, err));
     if (def->resume)
         GBT_TRY(resume_open(t, data, run, paths->checkpoint, paths->checkpoint_previous, def, strings, err));
     else
         GBT_TRY(trainer_open(t, data, def, err));
-    for (size_t i = 0; i < t->view_count; i++) /* there, too, 0 is no limit */
+    for (size_t i = 0; i < t->view_count; i++) /* 0 means no limit here, too */
         t->views[i].frame.scene.tape_bytes_max = def->memory / 8 / t->view_count;
     if (t->step > 0)
         return GBT_OK;
@@ -262,7 +266,8 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
     return GBT_OK;
 }
 
-/* Each process has read the data, and the checkpoint that it goes on from, by itself. */
+/* Check that all processes have read the same data and the same checkpoint, since each reads them by
+   itself. */
 static gbt_status check_same_start(const trainer *t, gbt_error *err)
 {
     struct {
@@ -298,7 +303,8 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
     return run_data_save(run, t->scene.folder, err);
 }
 
-/* All is saved before held-out photos are aligned, which takes its time and can be stopped. */
+/* Save everything before the held-out photos are aligned, because alignment takes time and can be
+   interrupted. */
 static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
                          gbt_error *err)
 {
@@ -322,20 +328,20 @@ static bool holds_run(const run_paths *paths)
            file_exists(paths->model);
 }
 
-/* What a run has in its folder before its first step. */
+/* Write the files that a run has before its first step. */
 static gbt_status begin_files(trainer *t, const char *run, const run_paths *paths, const gbt_train_def *def,
                               const config_strings *strings, gbt_error *err)
 {
     if (def->overwrite && holds_run(paths))
         GBT_TRY(old_run_remove(run, err));
-    /* data_places says where the data are that checkpoint and model name: no others, should this run end
-       before it has saved. */
+    /* data_places must describe the data set that checkpoint and model name, also if this run ends before it
+       has saved. */
     if (def->resume && strcmp(strings->data, t->scene.folder) != 0)
         GBT_TRY(save_surely(t, paths, err));
     return write_settings(t, run, paths, err);
 }
 
-/* Files and words are the first process's. */
+/* Train in a locked folder. Only the first process writes files and messages. */
 static gbt_status run_in_folder(trainer *t, const char *data, const char *run, const run_paths *paths,
                                 const gbt_train_def *def, config_strings *strings, gbt_error *err)
 {
@@ -355,14 +361,14 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
         status = run_steps(t, paths, saving, &log, err);
     if (status == GBT_OK)
         status = cluster_follow(cluster_leads() ? finish(t, paths, saving, &log, err) : GBT_OK, err);
-    save_finish(saving, NULL); /* of a run that failed */
+    save_finish(saving, NULL); /* only still running after a failure */
     mem_free(saving);
     if (cluster_leads())
         run_log_close(&log);
     return status;
 }
 
-/* Before any work: a run that cannot be written must not start. */
+/* Create and lock the folder before any work, so that a run that could not be written does not start. */
 static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
                                   config_strings *strings, gbt_error *err)
 {
@@ -379,7 +385,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     const bool locked = opened && status == GBT_OK;
     if (locked && def->memory > 0)
         status = gbt_set_memory(def->memory, run, err);
-    if (locked && status == GBT_OK && def->resume) /* reads checkpoints */
+    if (locked && status == GBT_OK && def->resume) /* it reads checkpoints, so it needs the lock */
         status = resume_mend(paths.checkpoint, paths.checkpoint_previous, err);
     status = cluster_follow(status, err);
     if (status == GBT_OK)

@@ -12,10 +12,10 @@
 
 static const char places_name[] = "data_places";
 
-/* From one absolute folder to another; false when it does not fit. */
+/* Relative path from one absolute folder to another; false when it does not fit into `out`. */
 static bool relative_path(const char *from, const char *to, char *out, size_t size)
 {
-    size_t same = 0, used = 0; /* `same`: length of the folders that both are in */
+    size_t same = 0, used = 0; /* `same`: length of the common parent path */
     for (size_t i = 0;; i++) {
         const bool from_ends = from[i] == '\0' || from[i] == '/', to_ends = to[i] == '\0' || to[i] == '/';
         if (from_ends && to_ends)

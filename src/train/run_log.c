@@ -71,7 +71,7 @@ static size_t header_text(char *out, size_t size)
     return used;
 }
 
-/* The score of held-out photos that a row may hold. */
+/* Restore the held-out score from a row of log.csv, if it has one. */
 static void recall_evaluation(run_log *log, const char *row, size_t length)
 {
     char line[2048];
@@ -95,8 +95,8 @@ static void recall_evaluation(run_log *log, const char *row, size_t length)
     log->evaluated_psnr[log->evaluated_count++] = psnr;
 }
 
-/* Start the file, or go back to where the checkpoint was made: rows of steps that will be taken again, or
-   that a kill cut short, go. */
+/* Start log.csv, or cut it back to the checkpoint's step: rows of steps that will be repeated, and a row cut
+   off by a kill, are removed. */
 static gbt_status rewind_rows(run_log *log, const char *csv_path, uint64_t step, gbt_error *err)
 {
     char header[1024];
@@ -126,7 +126,7 @@ static void flush_events(run_log *log)
     log->records.count = 0;
 }
 
-/* The same for TensorBoard, which is also told that steps may come again. */
+/* The same for the TensorBoard events, with a record that says that steps may be repeated. */
 static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, gbt_error *err)
 {
     unsigned char *bytes = NULL;
@@ -138,7 +138,7 @@ static gbt_status rewind_events(run_log *log, const char *path, uint64_t step, g
     if (kept == 0)
         event_add_version(r);
     if (step > 0)
-        event_add_start(r, step + 1); /* what is kept ends with `step` */
+        event_add_start(r, step + 1); /* the kept records end with `step` */
     gbt_status status = file_write_atomic(path, bytes, kept, err);
     mem_free(bytes);
     if (status == GBT_OK && (log->events = fopen(path, "ab")) == NULL)
@@ -170,7 +170,7 @@ gbt_status run_log_open(run_log *log, const trainer *t, const char *csv_path, co
 
 static double seconds_of(const run_sums *s) { return s->stage[RUN_STAGE_all].wall; }
 
-/* A step that was not skipped, on photos that are not masked whole. */
+/* Does the step have a loss: not skipped, and at least one photo not fully masked? */
 static bool compares(const step_report *r) { return !r->skipped && !isnan(r->psnr); }
 
 static void add_step(run_sums *s, const step_report *r)
@@ -199,7 +199,7 @@ static void add_step(run_sums *s, const step_report *r)
 static void write_row(run_log *log, const trainer *t, int width, int height, double test_psnr)
 {
     const run_sums *s = &log->row;
-    /* No step since the last row: no means. */
+    /* NaN when there was no step since the last row. */
     const double n = s->steps > 0 ? (double)s->steps : (double)NAN,
                  compared = s->compared > 0 ? (double)s->compared : (double)NAN;
     const double values[] = {
@@ -283,7 +283,7 @@ void run_log_evaluation(run_log *log, const trainer *t, double psnr)
              psnr);
 }
 
-/* Four tables by stage: waiting is what the threads did not work in the stage's time. */
+/* Four tables by stage; "waiting" is the thread time in a stage that was not spent working. */
 static void add_stages(json_t *root, const run_sums *s)
 {
     static const char *const names[RUN_STAGES] = {
@@ -352,7 +352,7 @@ gbt_status run_log_summary(run_log *log, const trainer *t, const char *json_path
     json_object_set_new(root, "held_out", evals);
     json_object_set_new(root, "downscale", json_real(t->def.downscale));
     json_object_set_new(root, "eval_split", json_text(t->def.eval_split));
-    char seed[32]; /* JSON's whole numbers end at 2^63 - 1 */
+    char seed[32]; /* as text: jansson's integers end at 2^63 - 1 */
     snprintf(seed, sizeof seed, "%llu", (unsigned long long)t->def.seed);
     json_object_set_new(root, "seed",
                         t->def.seed > INT64_MAX ? json_text(seed) : json_integer((json_int_t)t->def.seed));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/run_split.c -- the names of the photos that a run holds out. */
+/* train/run_split.c -- RUN/held-out.txt: the names of the photos that a run holds out. */
 #include "train/run_split.h"
 
 #include <stdio.h>

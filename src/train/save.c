@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/save.c -- what a run leaves: written at once, or from a copy while steps go on. */
+/* train/save.c -- write the files of a run, at once or in the background from a copy while training
+   continues. */
 #include "train/save.h"
 
 #include <stdio.h>
@@ -47,9 +48,10 @@ static gbt_status save_model(const trainer *t, const char *path, gbt_error *err)
         m.background[i] = t->settings.background[i];
     }
     snprintf(m.data_folder, sizeof m.data_folder, "%s", t->scene.folder);
-    /* A run on a budget is told by its pace, so that a repetition by --pace writes the same file. */
+    /* The model of a budget run records its pace instead, so that repeating it with --pace writes the same
+       file. */
     gbt_train_def def = t->def;
-    def.lossless = false; /* says nothing of this file */
+    def.lossless = false; /* not a property of this uncompressed file */
     char text[PACE_TEXT_SIZE];
     if (def.iterations == 0 && t->pace.known == PACE_SEGMENTS) {
         pace_text(&t->pace, text);
@@ -102,7 +104,7 @@ gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err)
 
 enum { COPY_PIECE = 1 << 20, COPIES_MAX = 32 };
 
-/* An array of the copy, which is the trainer's until copy_trainer() has moved it. */
+/* An array to copy: the pointer is the trainer's array until copy_trainer() has replaced it by the copy. */
 typedef struct copied_array {
     void **array;
     size_t bytes;
@@ -111,7 +113,7 @@ typedef struct copied_array {
 typedef struct copy_list {
     copied_array arrays[COPIES_MAX];
     int count;
-    size_t bytes; /* of all, each from a new line of the cache on */
+    size_t bytes; /* of all arrays, each aligned to a cache line */
 } copy_list;
 
 static size_t to_lines(size_t bytes) { return (bytes + MEM_ALIGN - 1) / MEM_ALIGN * MEM_ALIGN; }
@@ -128,7 +130,7 @@ static void list_anchors(copy_list *list, anchors *a)
         list_array(list, &a->field[f], a->count * anchors_width(a, f) * sizeof(float));
 }
 
-/* All that steps change and files tell of. */
+/* All state that steps change and files contain. */
 static copy_list list_arrays(trainer *t)
 {
     copy_list list = {.count = 0};

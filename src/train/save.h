@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/save.h -- what a run leaves while it goes on and at its end: checkpoint, model, exposures, poses. */
+/* train/save.h -- save a run, during training and at its end: checkpoint, model, exposures, poses. */
 #ifndef GBT_TRAIN_SAVE_H
 #define GBT_TRAIN_SAVE_H
 
@@ -14,33 +14,34 @@ typedef struct run_paths {
         checkpoint_previous[RUN_PATH_SIZE];
 } run_paths;
 
-/** Write all of them. The model also where the checkpoint, which is 20 times as large, cannot be written;
-    exposures and poses only beside a model of the same step. The first failure. */
+/** Write all files. The model is written even when the checkpoint, which is 20 times as large, cannot be;
+    exposures and poses only together with a model of the same step. Returns the first failure. */
 gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err);
 
-/** The same, and once more, with a warning, where it fails: the reason may be gone. The second failure. */
+/** The same with one retry and a warning after a failure, whose cause may be temporary. Returns the second
+    failure. */
 gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err);
 
-/** A save that is written while steps go on: of a copy of all that changes. Start from {0}. */
+/** A background save: writes a copy of all changing state while steps go on. Start from {0}. */
 typedef struct save_beside {
     beside job;
     trainer copy;
-    void *memory; /* of the copy; NULL: nothing is being written */
+    void *memory; /* memory of the copy; NULL: no save is in progress */
     const run_paths *paths;
     gbt_status status;
     gbt_error error;
 } save_beside;
 
 /**
- * Begin one; `paths` are borrowed until save_finish(). Without memory for the copy it is done when this
- * returns. None may be under way: save_finish() first.
+ * Begin a background save; `paths` are borrowed until save_finish(). Without memory for the copy, the save is
+ * complete when this returns. No other save may be in progress: call save_finish() first.
  */
 gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err);
 
 /** Still being written? */
 bool save_is_under_way(save_beside *s);
 
-/** Wait for it; what writing came to. GBT_OK when there is none. */
+/** Wait for the save and return its result; GBT_OK when none is in progress. */
 gbt_status save_finish(save_beside *s, gbt_error *err);
 
 #endif

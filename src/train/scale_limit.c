@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/scale_limit.c -- scales are bound by the distance to the nearest training camera. */
+/* train/scale_limit.c -- upper limits of scales from the distance to the nearest training camera. */
 #include "train/scale_limit.h"
 
 #include <math.h>
@@ -7,7 +7,7 @@
 #include "base/memory.h"
 #include "bvh/points.h"
 
-/* Poses that are learned would bound the scales of a resumed run differently: those of the data set. */
+/* The given camera centres of the data set: learned poses would give a resumed run other limits. */
 static void camera_centers(const trainer *t, float *center)
 {
     for (size_t v = 0; v < t->train_count; v++) {

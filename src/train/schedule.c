@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/schedule.c -- progress, and what follows from it. */
+/* train/schedule.c -- progress, and the schedules that depend on it. */
 #include "train/schedule.h"
 
 #include <math.h>

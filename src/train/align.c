@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/align.c -- poses of held-out photos by the gradient of the loss. */
+/* train/align.c -- align the poses of held-out photos by Adam on the gradient of the loss. */
 #include "train/align.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/finest_pixel.c -- smallest pixel per anchor. */
+/* train/finest_pixel.c -- the smallest pixel that any training camera has at each anchor. */
 #include "train/finest_pixel.h"
 
 #include <math.h>

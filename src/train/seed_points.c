@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/seed_points.c -- points by plane sweep: for a pixel, the depth at which its neighbourhood looks the
-   same in the nearest photos. */
+/* train/seed_points.c -- sparse points by plane sweep: for a pixel, the depth at which its neighbourhood
+   matches the neighbouring photos. */
 #include "train/seed_points.h"
 
 #include <math.h>
@@ -20,10 +20,10 @@
 #include "base/vec.h"
 
 enum {
-    SAMPLES = 40000, /* pixels that are swept */
-    TRIED = 2000,    /* of these, around each distance that is tried */
+    SAMPLES = 40000, /* pixels that are swept through depths */
+    TRIED = 2000,    /* number of them used in the trial of each distance */
     KEPT = 20000,
-    KEPT_AT_LEAST = 1000, /* so many, however doubtful: a start that is better than none */
+    KEPT_AT_LEAST = 1000, /* minimum number, even of doubtful points: better than no start */
     NEIGHBORS = 4,
     DEPTHS = 96,
     PATCH = 5, /* pixels, odd */
@@ -31,13 +31,13 @@ enum {
     BLOCK = 64
 };
 
-/* Normalised correlation that counts as the same place; and by how much it must beat every depth that is not
-   next to it. */
+/* Normalised correlation that counts as a match, and the margin by which it must exceed that of every
+   non-adjacent depth. */
 static const float agreement = 0.7f, lead = 0.05f;
 
 typedef struct candidate {
     float position[3], color[3];
-    float doubt; /* 1 - correlation; more when other depths look as good; INFINITY: no point */
+    float doubt; /* 1 - correlation, increased when other depths match as well; INFINITY: no point */
     float depth;
     uint32_t index;
 } candidate;
@@ -46,7 +46,7 @@ typedef struct seed_view {
     gbt_camera camera;
     camera_lens lens;
     image photo;
-    float *gray; /* [height * width]; NaN where a pixel does not count */
+    float *gray; /* [height * width]; NaN where a pixel is invalid */
     size_t neighbor[NEIGHBORS];
     size_t neighbor_count;
 } seed_view;
@@ -59,8 +59,8 @@ typedef struct seeding {
     candidate *out;
 } seeding;
 
-/* The scene's scale: the mean distance of the cameras to where their axes meet. False where these do not:
-   then to the middle of the cameras. */
+/* The scene's scale: the mean distance of the cameras from the point where their axes meet. False when they
+   do not meet; then the mean distance from the middle of the cameras. */
 static bool find_scale(const seed_view *views, size_t count, double *distance)
 {
     gbt_camera cameras[SEED_VIEWS_MOST] = {{0}};
@@ -80,8 +80,8 @@ static bool find_scale(const seed_view *views, size_t count, double *distance)
     return meet;
 }
 
-/* Photos from places that are about a fifth of the distance away and look the same way: near enough to look
-   alike, far enough to tell depths. */
+/* For each photo, photos taken about a fifth of the scene distance away in a similar direction: near enough
+   to look alike, with a baseline long enough to resolve depth. */
 static void find_neighbors(seeding *s, double distance)
 {
     for (size_t i = 0; i < s->view_count; i++) {
@@ -122,8 +122,8 @@ static bool project(const seed_view *v, const double world[3], double pixel[2])
     return ahead > 0 && camera_pixel(&v->camera, &v->lens, world, pixel);
 }
 
-/* Grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`, bilinear; false when a
-   corner leaves the photo, or a pixel that does not count is near. */
+/* Bilinear grey values on a grid of PATCH x PATCH points around `center` with steps `du`, `dv`; false when a
+   corner is outside the photo, or an invalid pixel is involved. */
 static bool read_patch(const seed_view *v, const double center[2], const double du[2], const double dv[2],
                        float out[PATCH_AREA])
 {
@@ -151,7 +151,7 @@ static bool read_patch(const seed_view *v, const double center[2], const double 
     return true;
 }
 
-/* Subtract the mean and divide by the length; a flat patch becomes nearly 0 and so correlates with
+/* Subtract the mean and divide by the length; a flat patch becomes nearly 0, so it correlates with
    nothing. */
 static void normalize_patch(float p[PATCH_AREA])
 {
@@ -162,7 +162,7 @@ static void normalize_patch(float p[PATCH_AREA])
         p[i] -= mean;
         square += p[i] * p[i];
     }
-    const float scale = 1 / sqrtf(square + PATCH_AREA * 1e-4f); /* noise of 0.01 */
+    const float scale = 1 / sqrtf(square + PATCH_AREA * 1e-4f); /* assumes noise of 0.01 */
     for (int i = 0; i < PATCH_AREA; i++)
         p[i] *= scale;
 }
@@ -170,13 +170,14 @@ static void normalize_patch(float p[PATCH_AREA])
 typedef struct sweep {
     const seeding *s;
     const seed_view *view;
-    double start[3];  /* where the camera was when the pixel was taken */
-    double ray[3][3]; /* world directions with depth 1 through the pixel, one pixel to the right, one down */
+    double start[3];  /* position of the camera when the pixel was exposed */
+    double ray[3][3]; /* world directions with depth 1 through the pixel, the one to its right, and the one
+                         below */
     float patch[PATCH_AREA];
 } sweep;
 
-/* Mean of the better half of the correlations: the other half may be hidden there. -1 when too few photos see
-   the place. */
+/* Mean of the better half of the correlations: in the other photos the point may be occluded. -1 when too few
+   photos see the point. */
 static float agreement_at(const sweep *w, double depth)
 {
     float best[NEIGHBORS];
@@ -238,8 +239,8 @@ static bool start_sweep(const seeding *s, const seed_view *v, double px, double 
 static double depth_of(const seeding *s, double index)
 {
     const double u = index / (DEPTHS - 1);
-    return 1 / ((1 - u) / s->near + u / s->far); /* even in inverse depth: even steps along the other photos'
-                                                    lines */
+    return 1 / ((1 - u) / s->near + u / s->far); /* uniform in inverse depth, so that steps along the epipolar
+                                                    lines of other photos are nearly even */
 }
 
 static void find_depth(const sweep *w, candidate *c)
@@ -257,7 +258,7 @@ static void find_depth(const sweep *w, candidate *c)
             rival = fmaxf(rival, score[i]);
     double index = best;
     if (best > 0 && best + 1 < DEPTHS && score[best - 1] > -1 &&
-        score[best + 1] > -1) { /* the top of the parabola through three */
+        score[best + 1] > -1) { /* refine to the maximum of the parabola through three samples */
         const double left = (double)score[best - 1], right = (double)score[best + 1],
                      bend = left + right - 2 * (double)score[best];
         index += bend < 0 ? 0.5 * (left - right) / bend : 0;
@@ -297,9 +298,9 @@ static void sweep_pixels(seeding *s, size_t count, double distance)
     parallel_blocks(count, BLOCK, seed_block, s);
 }
 
-/* How far the scene is where axes do not tell: of distances from 1/64 to 64 times `scale` the one around
-   which most pixels have a depth, then the median of these depths. What agrees best at an end of the depths
-   lies beyond them. */
+/* The scene's distance when the camera axes do not determine it: of distances from 1/64 to 64 times `scale`,
+   take the one around which most pixels find a depth, then the median of these depths. A best match at either
+   end of the depth range does not count, because the true depth is beyond it. */
 static double try_distances(seeding *s, double scale)
 {
     float depth[TRIED];
@@ -372,7 +373,7 @@ static gbt_status keep_best(const seeding *s, scene_points *out, gbt_error *err)
         return base_fail(err, GBT_ERR_FORMAT,
                          "no sparse points, and no place that several photos see (check the poses; photos "
                          "from one place, only turned, give no depth)");
-    mem_free(out->position); /* a cloud of no points owns its arrays too */
+    mem_free(out->position); /* an empty cloud owns arrays, too */
     mem_free(out->color);
     out->position = mem_alloc(kept, 3 * sizeof *out->position, "seed points", err);
     out->color = mem_alloc(kept, 3 * sizeof *out->color, "seed points", err);

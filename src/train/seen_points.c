@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/seen_points.c -- sparse points on the pictures of the training photos. */
+/* train/seen_points.c -- do the training photos see the sparse points? */
 #include "train/seen_points.h"
 
 #include "train/camera_sees.h"
 
 enum { ASKED_MOST = 1 << 14 };
 
-/* Every n-th point first: those that are listed one after another often lie in one place. */
+/* Try every n-th point first, because consecutive points often lie close together. */
 static bool sees_a_point(const gbt_camera *camera, const scene_points *points)
 {
     const size_t stride = points->count / 512 + 1;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/settings.c -- the settings of training: the one table that defaults, ranges, RUN/config, the command
-   line, the environment and the comparison of a resumed run are made from. A new setting is a field of
-   gbt_train_def and a row here. */
+/* train/settings.c -- the table of training settings. Defaults, ranges, RUN/config, the command line,
+   environment variables and the comparison of a resumed run are all derived from it. A new setting is a field
+   of gbt_train_def and a row here. */
 #include "train/settings.h"
 
 #include <errno.h>
@@ -136,11 +136,11 @@ size_t gbt_train_setting_count(void) { return SETTING_COUNT; }
 
 const gbt_train_setting *gbt_train_setting_at(size_t index) { return &settings[index]; }
 
-/* ---- one setting of a def ---- */
+/* ---- one setting of a definition struct ---- */
 
 enum { NUMBER_TEXT_SIZE = 32 };
 
-/* As many digits, at least 6, as read back as the same number: 0.7, not 0.69999999999999996. */
+/* Print the fewest digits, at least 6, that read back as the same number: 0.7, not 0.69999999999999996. */
 static const char *number_text(double value, char out[NUMBER_TEXT_SIZE])
 {
     for (int digits = 6; digits <= DBL_DECIMAL_DIG; digits++) {
@@ -151,10 +151,10 @@ static const char *number_text(double value, char out[NUMBER_TEXT_SIZE])
     return out;
 }
 
-/* The field of a def that is written. */
+/* Address of a setting's field in `def`. */
 static void *place(const gbt_train_setting *s, gbt_train_def *def) { return (char *)def + s->offset; }
 
-/* The value as a number; whole ones above 2^53 come near. */
+/* The value as a double; integers above 2^53 are approximate. */
 static double number_of(const gbt_train_setting *s, const gbt_train_def *def)
 {
     const void *at = (const char *)def + s->offset;
@@ -180,7 +180,7 @@ static double number_of(const gbt_train_setting *s, const gbt_train_def *def)
     return 0;
 }
 
-/* What no int holds becomes a value that no setting allows. */
+/* Numbers outside the range of int become a value that no setting allows. */
 static int to_int(double number) { return number >= -1e9 && number <= 1e9 ? (int)number : INT_MIN; }
 
 static void set_number(const gbt_train_setting *s, double number, gbt_train_def *def)
@@ -265,7 +265,7 @@ void setting_text(const gbt_train_setting *s, const gbt_train_def *def, char *ou
     }
 }
 
-/* Where the text of a setting is kept: it is the n-th that has one. */
+/* Storage for the text of a setting: the n-th setting of kind text has the n-th buffer. */
 static char *text_of(const gbt_train_setting *s, setting_texts *texts)
 {
     int index = 0;
@@ -274,8 +274,8 @@ static char *text_of(const gbt_train_setting *s, setting_texts *texts)
     return texts->text[index];
 }
 
-/* A whole number: digits alone, which are exact up to 2^64, or what other programs write of one, 1e5 or
- * 100.0. */
+/* Parse an integer: plain digits, exact up to 2^64, or the forms that other programs write, such as 1e5 or
+   100.0. */
 static bool read_whole(const char *text, uint64_t *out)
 {
     char *end;

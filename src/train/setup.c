@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/setup.c -- anchors, networks and the state of a run, up to its first step. */
+/* train/setup.c -- prepare a run up to its first step: anchors, networks, and the rest of the state. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -21,8 +21,8 @@
 
 enum { DISTANCE_VIEWS = 4096 };
 
-/* Distances from training cameras, where there are very many a part of them, to a sample of the anchors: they
-   decide whether the networks see the distance, its unit, and t_near. */
+/* Distances from training cameras (of very many, a sample) to a sample of the anchors in view. They decide
+   whether the distance is an input of the networks, its unit, and t_near. */
 static gbt_status measure_distances(trainer *t, float *p5, float *median, float *p95, gbt_error *err)
 {
     const size_t stride = t->anchors.count / 512 + 1, per_view = (t->anchors.count + stride - 1) / stride;
@@ -32,7 +32,8 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     if (all == NULL)
         return GBT_ERR_NO_MEMORY;
     size_t count = 0;
-    /* The first sample that a picture shows; in the last pass, when none does, in any direction. */
+    /* The first sampled anchor in the camera's image; if no camera sees one, the last pass accepts any
+       direction. */
     for (size_t pass = 0; pass <= stride && count == 0; pass++)
         for (size_t v = 0; v < t->train_count; v += step) {
             const gbt_camera *camera = &t->scene.views[t->train_views[v]].camera;
@@ -53,8 +54,8 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
     return GBT_OK;
 }
 
-/* The first features carry the colour of the nearest point: the networks need not discover it anchor by
-   anchor. The rest is 0. */
+/* The first three features are the colour of the nearest point, so that the networks need not learn it anchor
+   by anchor. The others are 0. */
 static gbt_status start_features(trainer *t, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
@@ -71,7 +72,7 @@ static gbt_status start_features(trainer *t, gbt_error *err)
     return status;
 }
 
-/* What lies behind everything and was never photographed looks least wrong in the scene's mean colour. */
+/* The mean colour of the points: the least wrong background for what no photo shows. */
 static void mean_color(const scene_points *points, float color[3])
 {
     double sum[3] = {0, 0, 0};
@@ -82,7 +83,7 @@ static void mean_color(const scene_points *points, float color[3])
         color[c] = (float)(sum[c] / (double)points->count);
 }
 
-/* From a camera to the points in its picture: the median over a sample of them; 0 without any. */
+/* Median distance from a camera to a sample of the points in its image; 0 when there are none. */
 static double middle_distance(const gbt_camera *camera, const scene_points *points)
 {
     float distances[512];
@@ -108,8 +109,8 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
     def.balls.min_radius = t->rules.ball_radius_min;
     def.offset_count = t->def.offsets;
     def.scale_factor = (float)t->def.scale_factor;
-    /* Cameras that stand together say nothing of the size of what they see; and in the middle of it they are
-       not away from the middle of the points. */
+    /* The spread of cameras that are close together says nothing about the size of the scene, and for cameras
+       in the middle of the scene neither does their distance from the middle of the points. */
     const scene_points *points = &t->scene.points;
     const gbt_camera *camera = &t->scene.views[t->train_views[0]].camera;
     const double away = fmax(dvec_length(camera->center), middle_distance(camera, points));
@@ -155,14 +156,14 @@ static gbt_status make_views(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
-/* Networks with random weights, and what the anchors' distances say: their unit, t_near, the range of
-   scales. */
+/* Random network weights, and the values that follow from the anchors' distances: the unit of the distance
+   input, t_near, and the range of scales. */
 static gbt_status make_decoder(trainer *t, gbt_error *err)
 {
     const gbt_train_def *def = &t->def;
     float p5, median, p95;
     GBT_TRY(measure_distances(t, &p5, &median, &p95, err));
-    /* Off by default in the reference, and a trap where distances vary widely. */
+    /* The reference has the distance input off by default; it matters when distances vary widely. */
     const bool wide = p95 > 3 * p5;
     const bool has_distance =
         def->distance == GBT_DISTANCE_INPUT_ON ||
@@ -200,14 +201,15 @@ static void choose_background(trainer *t)
             mean_color(&t->scene.points, t->settings.background);
         t->settings.sky.varies = wants_sky;
     }
-    if (t->settings.sky.varies) /* it is what the photos show */
+    if (t->settings.sky.varies) /* a learned sky is what the photos show */
         t->rules.opaque_from = HUGE_VAL;
     else if (wants_sky)
         log_warn("%s: no sky is learned: %s", t->scene.folder,
                  given ? "photos with an alpha channel lie on one colour" : "compat has one colour");
 }
 
-/* How long the run is; a budget decides as it goes on. A run that is resumed has what it has. */
+/* Set the length of the run; with a budget it is decided during the run. A resumed run already has its
+   length. */
 static gbt_status take_length(trainer *t, gbt_error *err)
 {
     gbt_train_def *def = &t->def;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/setup_data.c -- from a folder to the photos and points of a run. */
+/* train/setup_data.c -- load the photos and points of a run from a data set folder. */
 #include "train/setup_data.h"
 
 #include <stdio.h>
@@ -20,7 +20,7 @@
 
 static int compare_points(const void *a, const void *b) { return memcmp(a, b, 3 * sizeof(float)); }
 
-/* How many points there are at different places; `most` is enough. */
+/* Count the distinct positions of the points, up to `most`. */
 static gbt_status count_places(const scene_points *points, size_t most, size_t *out, gbt_error *err)
 {
     float *sorted = mem_alloc(points->count, 3 * sizeof *sorted, "points", err);
@@ -35,7 +35,7 @@ static gbt_status count_places(const scene_points *points, size_t most, size_t *
     return GBT_OK;
 }
 
-/* `more` after the points that are there; both have colours then. */
+/* Append the points `more`; the result has colours. */
 static gbt_status append_points(scene_points *points, const scene_points *more, gbt_error *err)
 {
     const size_t before = points->count, after = before + more->count;
@@ -50,8 +50,8 @@ static gbt_status append_points(scene_points *points, const scene_points *more, 
     return GBT_OK;
 }
 
-/* Points of our own where the data set has none, none that half of the photos see, or few; the reference
-   method takes few as they are. */
+/* Make points by photo consistency when the data set has none, few, or none that half of the photos see. The
+   reference method accepts few points as they are. */
 static gbt_status provide_points(trainer *t, gbt_error *err)
 {
     scene_points *points = &t->scene.points, made = {0};
@@ -79,7 +79,7 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     else if (blind || status == GBT_ERR_NO_MEMORY)
         status = base_fail(err, status, "%s", why.text);
     else
-        status = GBT_OK; /* the few must do */
+        status = GBT_OK; /* fall back to the few points of the data set */
     snprintf(t->start_text, sizeof t->start_text, "%zu sparse points and %zu found by photo consistency",
              t->points_used, made.count);
     if (blind)
@@ -112,7 +112,7 @@ static gbt_status choose_views(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
-/* What cameras are divided by, where that was left open. */
+/* Choose the downscale factor when it was not given. */
 static gbt_status choose_downscale(trainer *t, gbt_error *err)
 {
     if (t->def.downscale > 0)
@@ -127,7 +127,7 @@ static gbt_status choose_downscale(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
-/* Before any work: a limit that cannot be kept. */
+/* Refuse, before any work, a memory limit that cannot be kept. */
 static gbt_status check_memory(const trainer *t, gbt_error *err)
 {
     const memory_need need = memory_need_of(&t->scene, t->def.downscale, &t->rules);
@@ -141,7 +141,7 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
         t->scene.views[0].camera.height, ceil(need.least / 0x1p20), ceil(need.whole / 0x1p20));
 }
 
-/* Nothing would be learned, and no loss would tell. */
+/* Refuse photos without any valid pixel: nothing would be learned, and the loss would not show it. */
 static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
 {
     bool any;
@@ -155,9 +155,9 @@ static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
         t->scene.folder);
 }
 
-/* What is held out is read after the last step, to score it: what could not be read then is told now. The
-   headers of all photos have been seen, which tell of files that are cut and of other shapes; damaged pixels
-   are looked for in no more photos than are trained on, so that it takes no longer than to read those. */
+/* Held-out photos are only read after the last step, to score them; unreadable ones are reported now.
+   Truncated files and wrong shapes were already found in the headers. Damaged pixels are searched in at most
+   as many photos as are trained on, so that this takes no longer than reading those. */
 static gbt_status try_held_out(trainer *t, gbt_error *err)
 {
     const size_t most = t->test_count < t->train_count ? t->test_count : t->train_count;
@@ -217,7 +217,7 @@ gbt_status setup_data(trainer *t, const char *data, gbt_error *err)
     t->extent = scene_camera_extent(&t->scene);
     GBT_TRY(provide_points(t, err));
     GBT_TRY(choose_exposure(t, err));
-    for (size_t i = 0; i < t->scene.view_count; i++) { /* tracks, which nobody asks for any more */
+    for (size_t i = 0; i < t->scene.view_count; i++) { /* free the tracks, which are not needed any more */
         mem_free(t->scene.views[i].seen);
         t->scene.views[i].seen = NULL;
         t->scene.views[i].seen_count = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sky_learning.c -- Adam over the background's coefficients. */
+/* train/sky_learning.c -- Adam over the coefficients of the background. */
 #include "train/sky_learning.h"
 
 #include <math.h>
@@ -31,6 +31,6 @@ void sky_step(trace_settings *s, sky_moments *m, double gradient[SH_COUNT][3], a
 
 double sky_rate(double progress)
 {
-    const double first = 0.01, last = 0.02; /* of first */
+    const double first = 0.01, last = 0.02; /* as a fraction of first */
     return first * exp(progress * log(last));
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/sky_learning.h -- the background's colours, learned beside the scene. */
+/* train/sky_learning.h -- the direction-dependent background, learned together with the scene. */
 #ifndef GBT_TRAIN_SKY_LEARNING_H
 #define GBT_TRAIN_SKY_LEARNING_H
 
@@ -8,16 +8,16 @@
 #include "trace/settings.h"
 #include "train/adam.h"
 
-/** The colour, then the harmonics. */
+/** Trainable numbers: the constant colour, then the coefficients of the harmonics. */
 enum { SKY_NUMBERS = SH_COUNT * 3 };
 
-/** Adam's, of one sky. Start from {0}. */
+/** Adam moments of one sky. Start from {0}. */
 typedef struct sky_moments {
     float first[SKY_NUMBERS], second[SKY_NUMBERS];
-    float packed[SKY_NUMBERS]; /* room for sky_pack() */
+    float packed[SKY_NUMBERS]; /* buffer for sky_pack() */
 } sky_moments;
 
-/** All coefficients as one array, and back. */
+/** Copy all coefficients into one array, and back. */
 void sky_pack(const trace_settings *s, float out[SKY_NUMBERS]);
 void sky_unpack(const float in[SKY_NUMBERS], trace_settings *s);
 

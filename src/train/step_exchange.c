@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_exchange.c -- outcomes to everybody; rows to the process that adds them up, and their sums to
-   everybody. */
+/* train/step_exchange.c -- send outcomes to all processes, rows to the process that sums them, and the sums
+   to all. */
 #include "train/step_exchange.h"
 
 #include <string.h>
@@ -22,7 +22,7 @@ void step_exchange_outcomes(trainer *t)
     cluster_gather(mine, counts, t->outcomes);
 }
 
-/* One number from each process to each. */
+/* Every process sends one number to every other. */
 static void exchange_counts(const size_t *mine, size_t *theirs)
 {
     uint32_t out[STEP_VIEWS_MAX], in[STEP_VIEWS_MAX];
@@ -42,7 +42,7 @@ gbt_status step_exchange_rows(trainer *t, const row_list *mine, size_t numbers, 
     const size_t size = (size_t)gbt_cluster_size(), width = mine->width, words = 1 + width;
     size_t send[STEP_VIEWS_MAX], receive[STEP_VIEWS_MAX], rows = 0, begin = 0;
 
-    /* To the owners. */
+    /* Send each row to its owner, the process that sums rows of that number. */
     for (size_t r = 0; r < size; r++) {
         const size_t end = row_list_find(mine, (uint32_t)(numbers * (r + 1) / size));
         send[r] = (end - begin) * words;
@@ -54,7 +54,7 @@ gbt_status step_exchange_rows(trainer *t, const row_list *mine, size_t numbers, 
     GBT_TRY(row_list_resize(&t->received, rows, width, err));
     cluster_exchange(mine->words, send, t->received.words, receive);
 
-    /* Their sums. */
+    /* Sum the rows received. */
     row_list parts[STEP_VIEWS_MAX];
     const row_list *lists[STEP_VIEWS_MAX];
     row_word *at = t->received.words;
@@ -65,7 +65,7 @@ gbt_status step_exchange_rows(trainer *t, const row_list *mine, size_t numbers, 
     }
     GBT_TRY(row_list_sum(lists, size, &t->owned, err));
 
-    /* To everybody. */
+    /* Send the sums to all processes. */
     rows = 0;
     for (size_t r = 0; r < size; r++)
         send[r] = t->owned.count * words;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_pixels.c -- which part of a photo's pixels a training step looks at. */
+/* train/step_pixels.c -- the spacing of the pixels of a photo that a training step uses. */
 #include "train/step_pixels.h"
 
 #include <math.h>

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_pixels.h -- how many of a photo's pixels a step looks at. */
+/* train/step_pixels.h -- how many pixels of a photo a training step uses. */
 #ifndef GBT_TRAIN_STEP_PIXELS_H
 #define GBT_TRAIN_STEP_PIXELS_H
 
 #include "train/rules.h"
 
 /**
- * Steps look at every n-th pixel across and down: at about rules.step_pixels, or at all of a photo that is
- * not much larger. Returned is n, at least 1.
+ * Spacing n >= 1 of the pixels that a step uses, every n-th across and down: such that there are about
+ * `pixels` of them, or n = 1 for a photo that has not many more.
  *
- * @param camera [in] of the photo, of the size that it is trained at
- * @param pixels [in] how many, about; infinite: all
+ * @param camera [in] of the photo at training resolution
+ * @param pixels [in] approximate number; infinite: all
  */
 int step_spacing(const gbt_camera *camera, double pixels);
 
-/** How many pixels that is, about. */
+/** The resulting number of pixels, approximately. */
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_rows.c -- gradients and statistics of views: to rows, summed, and back. */
+/* train/step_rows.c -- convert gradients and statistics of views to rows, sum them, and convert back. */
 #include "train/step_rows.h"
 
 #include <string.h>
@@ -13,7 +13,7 @@
 
 enum { ROW_BLOCK = 512 };
 
-/* One array that a part of each row comes from, or goes to. */
+/* An array that one part of each row is copied from or to. */
 typedef struct row_part {
     float *values;
     size_t width;
@@ -21,10 +21,10 @@ typedef struct row_part {
 
 enum { PARTS_MAX = ANCHOR_FIELDS + GROWTH_STATS };
 
-/* What a row has, in its order. */
+/* The parts of a row, in order. */
 typedef struct row_shape {
     row_part part[PARTS_MAX];
-    int learned, count; /* parts that are gradients come first */
+    int learned, count; /* the first `learned` of `count` parts are gradients */
     size_t width;
 } row_shape;
 
@@ -90,7 +90,7 @@ typedef struct give_job {
     row_shape shape;
     trainer *t;
     const row_list *rows;
-    float share; /* of a view in the mean */
+    float share; /* weight of a view in the mean */
 } give_job;
 
 static void give_block(size_t block, size_t begin, size_t end, void *context)

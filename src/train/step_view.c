@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/step_view.c -- a view of a step: its photo and pixels, its render, its gradient as rows. */
+/* train/step_view.c -- a view of a step: choose photo and pixels, render, compare, and make the gradient
+   rows. */
 #include "train/step_view.h"
 
 #include <math.h>
@@ -21,7 +22,7 @@
 
 /* ---- which photo ---- */
 
-/* How many views come before view `index` of the next step. */
+/* Number of views of the run before view `index` of the next step. */
 static uint64_t views_before(const trainer *t, size_t index)
 {
     return t->step * (uint64_t)t->def.views + index;
@@ -49,7 +50,7 @@ static size_t pick_photo(trainer *t, uint64_t before)
     return t->order[before % t->train_count];
 }
 
-/* Which pixels of the photo, at random. */
+/* Random choice of the first pixel of the grid. */
 static photo_pick pick_pixels(const trainer *t, size_t view, uint64_t before)
 {
     uint32_t words[4];
@@ -60,8 +61,8 @@ static photo_pick pick_pixels(const trainer *t, size_t view, uint64_t before)
                         .step = step};
 }
 
-/* Late in a run every second view of a step has another colour behind it: only what hides it is right on all
-   of them. True where it is another. */
+/* Late in a run half of the views get a random background colour: only opaque surfaces then give the right
+   image on all backgrounds. Returns true for a random background. */
 static bool pick_background(const trainer *t, uint64_t before, float out[3])
 {
     uint32_t words[4];
@@ -69,14 +70,14 @@ static bool pick_background(const trainer *t, uint64_t before, float out[3])
     if (pace_progress(&t->pace, t->step) < t->rules.opaque_from)
         return false;
     rng_philox(t->def.seed, RNG_STREAM_BACKGROUND, before, words);
-    if (words[3] >> 31 != 0) /* at random: photos come in turn */
+    if (words[3] >> 31 != 0) /* chosen at random, not alternately, because photos come in turn */
         return false;
     for (int c = 0; c < 3; c++)
         out[c] = rng_unit(words[c]);
     return true;
 }
 
-/* The matrix by which a photo's exposure shows the scene, NULL: as it is. */
+/* The colour matrix of a photo's exposure; NULL: none. */
 static const float *exposure_of(const trainer *t, size_t slot)
 {
     return t->exposures.count > 0 ? t->exposures.matrix + slot * AFFINE_NUMBERS : NULL;
@@ -98,7 +99,7 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     float backdrop[3];
     if (pick_background(t, before, v->background)) {
         memcpy(backdrop, v->background, sizeof backdrop);
-        if (exposure_of(t, v->slot) != NULL) { /* it is seen through that, too */
+        if (exposure_of(t, v->slot) != NULL) { /* the photo shows the backdrop through its exposure, too */
             image pixel = {.width = 1, .height = 1, .channels = 3, .pixels = backdrop};
             affine_apply(exposure_of(t, v->slot), &pixel, &pixel);
         }
@@ -109,7 +110,8 @@ static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err
     v->outcome.height = v->camera.height;
     if (v->valid == NULL || t->view_count == 1)
         return GBT_OK;
-    const size_t pixels = (size_t)v->camera.width * (size_t)v->camera.height; /* the next photo has others */
+    const size_t pixels = (size_t)v->camera.width * (size_t)v->camera.height; /* a copy, because the next
+                                                                                 photo overwrites the mask */
     GBT_TRY(mem_reserve((void **)&v->marks, &v->marks_capacity, 0, pixels, 1, "valid pixels", err));
     memcpy(v->marks, v->valid, pixels);
     v->valid = v->marks;
@@ -189,7 +191,7 @@ gbt_status step_view_compare(step_view *v, const unsigned char *valid, const flo
     return GBT_OK;
 }
 
-/* As the photo's exposure shows it. */
+/* Compare the render, through the photo's exposure, with the photo. */
 static gbt_status compare(const trainer *t, step_view *v, image_loss_result *loss, gbt_error *err)
 {
     const unsigned char *valid;
@@ -199,7 +201,7 @@ static gbt_status compare(const trainer *t, step_view *v, image_loss_result *los
 
 /* ---- and back ---- */
 
-/* A row of zeros for each visible anchor. */
+/* Make a row of zeros for each visible anchor. */
 static gbt_status make_rows(const trainer *t, step_view *v, gbt_error *err)
 {
     const size_t count = v->frame.visible_count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* train/trainer.c -- one training step, readable from top to bottom. */
+/* train/trainer.c -- one training step, from choosing views to growth. */
 #include "train/trainer.h"
 
 #include <math.h>
@@ -36,8 +36,8 @@ static learning_model model_of(trainer *t)
 
 /* ---- one step ---- */
 
-/* Count a step that teaches nothing; nothing may have changed yet but the gradients, which are cleared.
-   `what` names the reason. */
+/* Skip a step with a non-finite loss or gradient: count it and clear the gradients. Nothing else may have
+   changed yet. `what` is the reason. */
 static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_error *err)
 {
     learnables_zero(&t->gradient, t->decoder.param_count);
@@ -53,10 +53,10 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
     return GBT_OK;
 }
 
-/* Raise opacities when no Gaussian has been made for EMPTY_STEPS steps; and, until anchors grow, those of an
-   offset whose mean opacity is below 0. The networks begin at random, and while colours are wrong their
-   opacities fall, all together: what is below 0 everywhere hardly ever comes back. The step's first view
-   says what an offset's mean is. */
+/* Raise opacities when no Gaussian was made for EMPTY_STEPS steps; until anchors grow, also those of each
+   offset whose mean opacity is below 0. The networks start with random weights, and while colours are wrong
+   all opacities fall together; an offset below 0 everywhere has no gradient and hardly ever recovers. Means
+   are taken over the step's first view. */
 static void raise_opacities(trainer *t, const step_report *r, double progress)
 {
     const bool early = progress < t->rules.raises_until;
@@ -75,7 +75,7 @@ static void raise_opacities(trainer *t, const step_report *r, double progress)
     decoder_networks(&t->decoder, networks);
     const decoder_network *opacity = &networks[DECODER_OPACITY];
     learnables *const moments[] = {&t->moment1, &t->moment2};
-    for (int i = 0; i < 2; i++) /* what pulled the opacities down must not go on */
+    for (int i = 0; i < 2; i++) /* clear the momentum that pulled opacities down */
         memset(moments[i]->networks + opacity->begin, 0, (opacity->end - opacity->begin) * sizeof(float));
     t->empty_in_row = 0;
     if (t->opacity_raises++ == 0)
@@ -90,8 +90,8 @@ static void run_view(size_t block, size_t begin, size_t end, void *context)
         step_view_run(t, &t->views[i]);
 }
 
-/* This process's views of the step: photos one after the other, for they share what is kept of them; the rest
-   beside each other. Then what all processes' came to. */
+/* Run this process's views of the step: photos are read one after the other, because they share the cache;
+   the rest runs in parallel. Then exchange the outcomes of all processes. */
 static gbt_status run_views(trainer *t, step_report *out, gbt_error *err)
 {
     step_photos_pick(t);
@@ -120,8 +120,8 @@ static gbt_status run_views(trainer *t, step_report *out, gbt_error *err)
     return GBT_OK;
 }
 
-/* Means over the views, of what they lose over those of which a pixel counts; the size is that of the first
-   one. */
+/* Means over the views; those of losses only over views with a valid pixel. The size is that of the first
+   view. */
 static void report_views(const trainer *t, step_report *out)
 {
     const view_outcome *first = &t->outcomes[0];
@@ -150,7 +150,7 @@ static void report_views(const trainer *t, step_report *out)
     out->visible /= (size_t)t->def.views;
 }
 
-/* Each photo's matrix learns by itself. */
+/* One Adam step of the colour matrix of each photo of the step. */
 static void learn_exposures(trainer *t, double progress, double next)
 {
     const double rate = t->def.learning_rate_factor *
@@ -159,7 +159,7 @@ static void learn_exposures(trainer *t, double progress, double next)
         exposures_step(&t->exposures, t->slots[i], t->outcomes[i].d_exposure, rate);
 }
 
-/* So does the pose of each, but for the mean of all. */
+/* One Adam step of the pose of each photo of the step; the mean of all poses stays. */
 static void learn_poses(trainer *t, double progress, double next)
 {
     const double rate =
@@ -168,7 +168,7 @@ static void learn_poses(trainer *t, double progress, double next)
         poses_step(&t->poses, &t->scene, t->train_views, t->slots[i], t->outcomes[i].d_pose, rate);
 }
 
-/* What all views say of the background. */
+/* One Adam step of the background with the mean gradient of the views. */
 static void learn_sky(trainer *t, double rate)
 {
     double sum[SH_COUNT][3] = {0};
@@ -180,7 +180,7 @@ static void learn_sky(trainer *t, double rate)
     sky_step(&t->settings, &t->sky, sum, adam_rates_of_views(rate, t->step + 1, t->def.views));
 }
 
-/* With one view a step, what it says goes straight to where several are added up to. */
+/* With one view per step, its statistics go straight into the trainer's. */
 static void gather_alone(trainer *t)
 {
     const step_view *v = &t->views[0];
@@ -206,7 +206,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                               .views = t->def.views});
     t->left_out = leaves_out ? schedule_left_out(all_views / (double)t->train_count) : 0;
 
-    /* Views, some pixels of each: renders, losses, gradients. */
+    /* Views, with some pixels of each: render, loss, gradient. */
     GBT_TRY(run_views(t, out, err));
     report_views(t, out);
     for (int i = 0; i < t->def.views; i++)
@@ -215,7 +215,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     t->skipped_in_row = 0;
     raise_opacities(t, out, progress);
 
-    /* One gradient, then parameters. */
+    /* Sum the gradients, then update the parameters. */
     stage_clock clock = stage_begin();
     if (t->def.views > 1)
         GBT_TRY(step_rows_add_up(t, out, err));
@@ -231,10 +231,10 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
     else
-        anchors_zero_learned(&t->gradient.anchors); /* what they miss is lost, as in the reference */
+        anchors_zero_learned(&t->gradient.anchors); /* this gradient is dropped, as in the reference */
     out->optimizer = stage_lap(&clock);
 
-    /* Anchors. */
+    /* Growth and pruning of anchors. */
     clock = stage_begin();
     if (t->def.views == 1 && growing_gathers(t))
         gather_alone(t);

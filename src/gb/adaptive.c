@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/adaptive.c -- granular balls where the scene needs them: the partition that is cut best first, to a
-   given number of balls.
+/* gb/adaptive.c -- adaptive granular balls: a best-first partition of a cloud into a given number of balls.
 
    points --> [joint moments: nats, axis] --> [2-means along the axis] --> saving of the cut --> heap
    heap --best--> the two parts, the same way
         \--enough--> balls
 
-   A waiting set is stored with its cut already made (in place: the array stays in the order of the tree), so
-   opening it only shares out its span. Statistics live in joint.c, the balls are written by fill.c. */
+   Every set in the heap has already been cut (in place, so the array stays in tree order); opening it only
+   divides its range into the two parts. Statistics are computed in joint.c, balls are written by fill.c. */
 #include "gb/adaptive.h"
 
 #include <math.h>
@@ -20,8 +19,8 @@
 #include "gb/joint.h"
 
 enum {
-    MEANS_ROUNDS = 16, /* of 2-means; it settles in about five */
-    DEPTH_MAX = 254    /* depths are counted from 1 in bytes */
+    MEANS_ROUNDS = 16, /* of 2-means, which converges in about five */
+    DEPTH_MAX = 254    /* a byte stores 1 + depth */
 };
 
 adaptive_def adaptive_def_default(void) { return (adaptive_def){.color_unit = 0.1f, .min_scale = 0.25f}; }
@@ -42,10 +41,11 @@ static gbt_status check_def(const adaptive_def *def, gbt_error *err)
     return GBT_OK;
 }
 
-/* A set, and the cut that is made when its turn comes. */
+/* A set in the heap, with its prepared cut. */
 typedef struct waiting {
-    double saving;  /* nats; 0 when it cannot be cut */
-    uint32_t begin; /* its place says where it is in the tree, whatever the order of the input */
+    double saving;  /* nats saved by the cut; 0 when the set cannot be cut */
+    uint32_t begin; /* index of its first point; it gives the set's position in the tree, independent of input
+                       order */
     uint32_t count;
     uint32_t left; /* size of the left part, 0 when it cannot be cut */
     uint8_t depth;
@@ -54,12 +54,12 @@ typedef struct waiting {
 typedef struct cutter {
     joint_space space;
     cloud_point *points; /* [n], reordered in place */
-    double *keys;        /* [n], places along the axis of the set in hand */
+    double *keys;        /* [n], coordinates along the axis of the set being cut */
 } cutter;
 
 /* ---- a cut ---- */
 
-/* Where 2-means along the axis cuts `keys`, which have mean 0: keys up to there go left. */
+/* The threshold of 2-means on `keys`, which have mean 0: keys up to it go left. */
 static double two_means(const double *keys, size_t count)
 {
     double bound = 0;
@@ -72,7 +72,7 @@ static double two_means(const double *keys, size_t count)
             in[side]++;
         }
         if (in[0] == 0 || in[1] == 0)
-            break; /* the points differ by rounding only */
+            break; /* the points differ only by rounding */
         const double next = 0.5 * (sum[0] / (double)in[0] + sum[1] / (double)in[1]);
         if (next == bound)
             break;
@@ -81,7 +81,7 @@ static double two_means(const double *keys, size_t count)
     return bound;
 }
 
-/* Points with keys up to `bound` to the front; returns how many. */
+/* Move points with keys up to `bound` to the front; returns their number. */
 static size_t move_left(cloud_point *points, double *keys, size_t count, double bound)
 {
     size_t left = 0;
@@ -104,7 +104,7 @@ static double nats_of(const cutter *c, const cloud_point *points, size_t count)
     return joint_nats(&m, count);
 }
 
-/* Makes the cut of a set and says what it saves. */
+/* Cut a set and compute the saving. */
 static waiting prepare(const cutter *c, size_t begin, size_t count, int depth)
 {
     waiting w = {.begin = (uint32_t)begin, .count = (uint32_t)count, .depth = (uint8_t)depth};
@@ -113,7 +113,7 @@ static waiting prepare(const cutter *c, size_t begin, size_t count, int depth)
     cloud_point *points = c->points + begin;
     joint_moments m;
     joint_compute(&c->space, points, count, &m);
-    /* Two anchors in one place would be of no use, however the colours differ. */
+    /* Do not cut a set at a single position: two anchors in one place are useless, even if colours differ. */
     if (!(m.covariance[0][0] + m.covariance[1][1] + m.covariance[2][2] > 0))
         return w;
     double axis[JOINT_DIM], y[JOINT_DIM];
@@ -133,7 +133,7 @@ static waiting prepare(const cutter *c, size_t begin, size_t count, int depth)
     return w;
 }
 
-/* ---- best first ---- */
+/* ---- best-first search ---- */
 
 static bool goes_before(const waiting *a, const waiting *b)
 {
@@ -150,7 +150,7 @@ static void heap_push(waiting *heap, size_t count, waiting added)
     heap[i] = added;
 }
 
-/* Puts `next` in the place of the first. */
+/* Replace the first entry by `next`. */
 static void heap_replace_first(waiting *heap, size_t count, waiting next)
 {
     size_t i = 0;
@@ -165,7 +165,7 @@ static void heap_replace_first(waiting *heap, size_t count, waiting next)
     heap[i] = next;
 }
 
-/* Cuts until there are `most` sets, or none can be cut; returns how many there are. */
+/* Cut until there are `most` sets, or none can be cut; returns the number of sets. */
 static size_t cut_best_first(const cutter *c, waiting *heap, size_t point_count, size_t most)
 {
     size_t count = 1;

@@ -5,9 +5,9 @@
                    |
                    +--> [principal axis, median] --> left, right (in place, in depth-first order)
 
-   The top of the tree is grown level by level, its sub-trees then one per block; marks and places depend on
-   the points only, so the number of threads changes nothing. Statistics live in moments.c, the cut in
-   split.c, the balls are written by fill.c. */
+   The top of the tree is grown level by level; then each sub-tree is one block of parallel work. Marks and
+   positions depend only on the points, so results do not depend on the number of threads. Statistics are
+   computed in moments.c, cuts in split.c, and balls are written by fill.c. */
 #include "gb/balls.h"
 
 #include <math.h>
@@ -24,10 +24,10 @@
 
 enum {
     BALL_DEPTH_MAX = 64,
-    SUBTREES = 64,         /* the top is grown until there are this many sets to share out ... */
+    SUBTREES = 64,         /* the top is grown until there are this many sets for parallel work ... */
     SUBTREE_POINTS = 4096, /* ... or no set is larger than this */
-    KEPT_SPACINGS = 4 /* the scale prior takes a radius beyond 4 spacings for 4 spacings: a wider tied set is
-                         not left whole */
+    KEPT_SPACINGS = 4 /* limit, in v, for leaving a tied set whole: the scale prior clips radii at 4 spacings
+                         anyway */
 };
 
 balls_def balls_def_default(void)
@@ -73,7 +73,7 @@ static gbt_status check_def(const balls_def *def, gbt_error *err)
 
 typedef struct partition {
     cloud_point *points;   /* [n], reordered in place */
-    double *keys;          /* [n], scratch of the cut */
+    double *keys;          /* [n], scratch for the cut */
     uint8_t *leaf_depth;   /* [n]: 1 + depth where a ball begins, else 0 */
     const float *color;    /* or NULL */
     double radius_compact; /* eta v */
@@ -89,7 +89,7 @@ typedef struct span {
     int depth;
 } span;
 
-/* Decides eq 23 and cuts; returns the size of the left part, 0 when the set is a ball. */
+/* Apply the stopping rule (eq 23) or cut; returns the size of the left part, 0 when the set is a ball. */
 static size_t try_split(const partition *p, const span *s)
 {
     if (s->count <= p->min_points || s->depth >= p->max_depth)
@@ -100,12 +100,13 @@ static size_t try_split(const partition *p, const span *s)
     const double radius = fmax(moments_radius(&m), p->radius_floor);
     if (radius <= p->radius_compact) {
         double mean[3];
-        /* Colours are read at random, so only for the few sets that are small enough to stop. */
+        /* Colours are random memory accesses, so they are tested last, for the few sets that are compact
+           enough to stop. */
         if (p->color == NULL || moments_color_std(points, s->count, p->color, mean) <= p->color_std_max)
             return 0;
     }
-    /* {a, b, b}: the paper keeps what its cut leaves on one side. Followed where that is harmless: one point
-       too many, and not wide. */
+    /* Ties such as {a, b, b}: the paper keeps a set whole when its cut leaves all points on one side.
+       Followed only where that is harmless: the set has one point too many and is not wide. */
     const bool keep_tied = s->count == p->min_points + 1 && radius <= p->radius_tied;
     return split_at_median(points, p->keys + s->begin, s->count, &m, keep_tied);
 }
@@ -123,7 +124,7 @@ static void children(const span *s, size_t left, span out[2])
 
 static void grow_subtree(const partition *p, span root)
 {
-    span stack[BALL_DEPTH_MAX + 2]; /* one waiting right part per level, and the set in hand */
+    span stack[BALL_DEPTH_MAX + 2]; /* one pending right part per level, and the current set */
     int waiting = 0;
     stack[waiting++] = root;
     while (waiting > 0) {
@@ -142,7 +143,7 @@ static void grow_subtree(const partition *p, span root)
 
 typedef struct frontier {
     const partition *partition;
-    size_t split_above; /* larger sets are cut while the top is grown, smaller ones wait for their block */
+    size_t split_above; /* larger sets are cut while the top is grown, smaller ones later in their block */
     span open[2 * SUBTREES];
     size_t left[2 * SUBTREES];
     size_t count;
@@ -215,7 +216,7 @@ gbt_status balls_build(const float *position, const float *color, size_t count, 
         p.points[i] = (cloud_point){{position[3 * i], position[3 * i + 1], position[3 * i + 2]}, (uint32_t)i};
     if (count > 0)
         grow(&p, count);
-    mem_free(p.keys); /* before the balls are allocated: they take its place */
+    mem_free(p.keys); /* freed before the balls are allocated, to limit the peak */
     p.keys = NULL;
 
     status = balls_fill(p.points, p.leaf_depth, count, color, p.radius_floor, out, err);

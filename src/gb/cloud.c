@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/cloud.c -- what every entry of this room asks of a cloud. */
+/* gb/cloud.c -- checks of an input cloud, shared by all functions of this folder. */
 #include "gb/cloud.h"
 
 #include <math.h>
@@ -23,8 +23,7 @@ gbt_status cloud_check(const char *who, const float *position, const float *colo
     }
     for (size_t i = 0; color != NULL && i < count; i++) {
         const float *c = color + 3 * i;
-        /* A colour in [0, 255] would never pass the colour test, and nobody would see why. NaN fails these
-           comparisons too. */
+        /* Colours in [0, 255] would silently fail every colour test. NaN fails these comparisons, too. */
         for (int k = 0; k < 3; k++)
             if (!(c[k] >= 0.0f && c[k] <= 1.0f))
                 return base_fail(err, GBT_ERR_ARGUMENT,

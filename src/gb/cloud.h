@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/cloud.h -- what every entry of this room asks of a cloud. */
+/* gb/cloud.h -- checks of an input cloud, shared by all functions of this folder. */
 #ifndef GBT_GB_CLOUD_H
 #define GBT_GB_CLOUD_H
 
@@ -8,7 +8,7 @@
 #include "gbtrace/status.h"
 
 /**
- * Points finite, colours in [0, 1], count within uint32_t indices.
+ * Check that points are finite, colours in [0, 1], and the count fits uint32_t indices.
  *
  * @param color [in] may be NULL
  * @return GBT_OK, or GBT_ERR_ARGUMENT with a message that begins with `who` and names the first bad point

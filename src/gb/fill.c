@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/fill.c -- from a reordered cloud and the places where balls begin to their members and statistics. */
+/* gb/fill.c -- make the members and statistics of balls from a reordered cloud and the marks where balls
+   begin. */
 #include "gb/fill.h"
 
 #include <float.h>
@@ -36,7 +37,7 @@ static void sort_by_index(cloud_point *points, size_t count)
     }
 }
 
-/* Coordinates near FLT_MAX have variances that no float holds. */
+/* Saturate: coordinates near FLT_MAX have variances beyond the range of float. */
 static float to_float(double x) { return (float)fmin(fmax(x, (double)-FLT_MAX), (double)FLT_MAX); }
 
 typedef struct fill_job {

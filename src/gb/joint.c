@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/joint.c -- position and colour of a set of points as one vector of six: moments, principal axis, length
-   of its description. */
+/* gb/joint.c -- position and colour of points as joint vectors of six numbers: moments, principal axis,
+   coding length. */
 #include "gb/joint.h"
 
 #include <math.h>
@@ -68,8 +68,9 @@ double joint_nats(const joint_moments *m, size_t count)
     memcpy(widened, m->covariance, sizeof widened);
     for (int k = 0; k < JOINT_DIM; k++)
         widened[k][k] += 1.0;
-    symmetric_cholesky(&widened[0][0], &l[0][0], JOINT_DIM, 1.0); /* I + C is at least I; sets of one line
-                                                                     lose that to rounding */
+    symmetric_cholesky(&widened[0][0], &l[0][0], JOINT_DIM, 1.0); /* in exact arithmetic I + C >= I; rounding
+                                                                     can break this for collinear sets, so
+                                                                     pivots are raised to 1 */
     for (int k = 0; k < JOINT_DIM; k++)
         sum += log(l[k][k]);
     return (double)count * sum;

@@ -6,8 +6,8 @@
 
 #include "base/parallel.h"
 
-/* A set is cut into at most MAX_BLOCKS blocks of at least BLOCK_POINTS points: partial sums fit on the stack,
-   small sets are one block. */
+/* A set is summed in at most MAX_BLOCKS blocks of at least BLOCK_POINTS points, so that partial sums fit on
+   the stack and small sets are one block. */
 enum { MAX_BLOCKS = 64, BLOCK_POINTS = 8192 };
 
 typedef struct block_sums {
@@ -57,14 +57,14 @@ static void sum_products(size_t block, size_t begin, size_t end, void *context)
     sum[5] = zz;
 }
 
-/* Adds the blocks in block order into total[0 .. terms). */
+/* Run the blocks and add their sums, in block order, into total[0 .. terms). */
 static void run_blocks(block_sums *sums, size_t count, parallel_body *body, int terms, double *total)
 {
     size_t grain = (count + MAX_BLOCKS - 1) / MAX_BLOCKS;
     if (grain < BLOCK_POINTS)
         grain = BLOCK_POINTS;
     if (count <= grain)
-        body(0, 0, count, sums); /* most sets hold a few points: no detour through the scheduler */
+        body(0, 0, count, sums); /* most sets have only a few points: bypass the scheduler */
     else
         parallel_blocks(count, grain, body, sums);
     for (int k = 0; k < terms; k++) {

@@ -7,7 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** A point that travels with its input index, so that every pass over a set reads memory in order. */
+/** A point with its input index. Points are moved, not indices, so that every pass over a set reads memory
+    sequentially. */
 typedef struct cloud_point {
     float position[3];
     uint32_t index;
@@ -19,12 +20,12 @@ typedef struct moments {
 } moments;
 
 /**
- * Two passes about the first point, then about the mean: exact 0 for equal points, no cancellation far from
- * the origin.
+ * Mean and covariance in two passes, about the first point and then about the mean: exactly 0 for equal
+ * points, and no cancellation far from the origin.
  *
  * @param count [in] >= 1
- * Threads: any; large sets are summed in blocks whose cut depends on `count` only, so the bits do not depend
- * on the number of threads.
+ * Threads: any; large sets are summed in blocks that depend only on `count`, so the bits do not depend on the
+ * number of threads.
  */
 void moments_compute(const cloud_point *points, size_t count, moments *out);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/split.c -- cut a set of points in two at the median of its principal axis (Yang 2026, eqs 24-27). */
+/* gb/split.c -- cut a set of points in two at the median along its principal axis (Yang 2026, eqs 24-27). */
 #include "gb/split.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@ void split_axes(const double covariance[6], double axes[3][3])
     double largest = 0;
     for (int k = 0; k < 6; k++)
         largest = fmax(largest, fabs(covariance[k]));
-    /* Scaled so that nothing over- or underflows, whatever the units of the cloud. */
+    /* Scaled to avoid overflow and underflow for any unit of length. */
     const double unit = largest > 0 ? largest : 1;
     const double xx = covariance[0] / unit, xy = covariance[1] / unit, xz = covariance[2] / unit;
     const double yy = covariance[3] / unit, yz = covariance[4] / unit, zz = covariance[5] / unit;
@@ -51,7 +51,7 @@ static double median3(double a, double b, double c)
     return a < b ? (b < c ? b : a < c ? c : a) : (a < c ? a : b < c ? c : b);
 }
 
-/* Median of 3, or of 3 medians of 3 when a bad pivot would cost much. */
+/* Median of 3; for large ranges, where a bad pivot is costly, the median of 3 medians of 3. */
 static double choose_pivot(const double *keys, ptrdiff_t low, ptrdiff_t high)
 {
     const ptrdiff_t n = high - low, middle = low + n / 2;
@@ -111,7 +111,7 @@ typedef struct projection {
     double mean[3], axis[3];
 } projection;
 
-/* z of eq 25. Evaluated twice per point, with the same bits: no contraction, fixed order. */
+/* z of eq 25. It is evaluated twice per point and must have the same bits: no contraction, fixed order. */
 static inline double project(const projection *p, const cloud_point *point)
 {
     return ((double)point->position[0] - p->mean[0]) * p->axis[0] +
@@ -127,7 +127,7 @@ static void fill_keys(size_t block, size_t begin, size_t end, void *context)
         p->keys[i] = project(p, &p->points[i]);
 }
 
-/* Points with z <= bound (z < bound when `strict`) to the front; returns how many. */
+/* Move points with z <= bound (z < bound when `strict`) to the front; returns their number. */
 static size_t move_left(cloud_point *points, size_t count, const projection *p, double bound, bool strict)
 {
     size_t i = 0, j = count;

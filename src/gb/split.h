@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* gb/split.h -- cut a set of points in two at the median of its principal axis (Yang 2026, eqs 24-27). */
+/* gb/split.h -- cut a set of points in two at the median along its principal axis (Yang 2026, eqs 24-27). */
 #ifndef GBT_GB_SPLIT_H
 #define GBT_GB_SPLIT_H
 
@@ -10,8 +10,8 @@
 
 /**
  * Orthonormal eigenvectors of a symmetric matrix, largest eigenvalue first; equal eigenvalues keep the order
- * x, y, z of the axes that they turned from. The sign makes the largest component of each positive;
- * components equal to 1e-9 count as tied, the lowest axis decides.
+ * x, y, z of the axes from which the Jacobi iteration rotated them. The sign makes the largest component of
+ * each positive; components within 1e-9 count as tied, and the lowest axis decides.
  *
  * @param covariance [in]  xx xy xz yy yz zz, finite
  * @param axes       [out] one unit vector per row; the identity for the zero matrix
@@ -19,10 +19,10 @@
 void split_axes(const double covariance[6], double axes[3][3]);
 
 /**
- * The element of rank `rank` (0 = smallest) of `keys` [count], which is reordered: those before place `rank`
- * are <= it, those after >= it.
+ * The element of rank `rank` (0 = smallest) of `keys` [count], which is reordered (quickselect): keys before
+ * index `rank` are <= it, keys after it are >= it.
  *
- * Cost: O(count) on average, O(count log count) for an input made to be bad.
+ * Cost: O(count) on average, O(count log count) for adversarial input.
  */
 double split_select(double *keys, size_t count, size_t rank);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/from_gaussians.c -- candidates at the means of Gaussians whose position would still move: their
-   screen-space gradient is large. */
+/* growth/from_gaussians.c -- growth candidates at the means of Gaussians with a large screen-space gradient:
+   the loss still pulls them to move. */
 #include <math.h>
 
 #include "anchor/activations.h"
@@ -12,7 +12,7 @@
 
 enum { CHOOSE_BLOCK = 4096 /* Gaussians */ };
 
-/* Not lost to the random drop. rng.h says which other streams these are. */
+/* Does the Gaussian survive the random drop of candidates? base/rng.h lists the random streams. */
 static bool is_drawn(const growth_def *def, int level, uint64_t slot)
 {
     return rng_uniform(def->seed, def->step * GROWTH_MAX_LEVELS + (uint64_t)level, slot) >
@@ -23,7 +23,7 @@ typedef struct choose_job {
     const growth_search *s;
     int level;
     float threshold;
-    bool *chosen; /* of all Gaussians */
+    bool *chosen; /* one per Gaussian */
 } choose_job;
 
 static void choose_block(size_t block, size_t begin, size_t end, void *context)

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/from_points.c -- candidates at the sparse points: known surface is worth more than what Gaussians
-   guess. They stand closer than v where there is much to see, so their cells are finer. */
+/* growth/from_points.c -- growth candidates at the sparse points, which lie on known surface. Where there is
+   much detail they are closer together than v, so their cells are finer by one level. */
 #include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "growth/sources.h"
 
-/* Does a Gaussian of the anchor count? Of those that enough views saw, or of all; `steepest` is the largest
-   mean gradient of them. */
+/* Does any Gaussian of the anchor qualify? `well_sampled`: only those that enough views saw. `steepest`
+   becomes the largest of their mean gradients. */
 static bool any_gaussian_counts(const growth_search *s, size_t anchor, bool well_sampled, float *steepest)
 {
     const size_t offsets = (size_t)s->a->offset_count;
@@ -45,5 +45,6 @@ gbt_status growth_from_points(growth_search *s, gbt_error *err)
     if (!growth_search_begin(s, s->def->level_count))
         return GBT_OK;
     GBT_TRY(add_points(s, err));
-    return growth_search_end(s, growth_anywhere, NULL, err); /* other photos have told where points are */
+    return growth_search_end(s, growth_anywhere, NULL, err); /* no may_stand test: several photos have already
+                                                                triangulated the points */
 }

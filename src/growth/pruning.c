@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/pruning.c -- anchors whose mean importance is too small are pruned. */
+/* growth/pruning.c -- mark the anchors whose mean importance is too small. */
 #include "growth/pruning.h"
 
 #include <math.h>
 
-/* What no view shows is worth nothing. */
+/* At least 1, so that an anchor that no view shows has importance 0. */
 static float shown_count(const growth_stats *stats, size_t i) { return fmaxf(stats->shown_count[i], 1); }
 
 static bool is_pruned(const growth_stats *stats, const growth_def *def, size_t i)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/round.c -- one round: where the scene needs more anchors, and which ones it can do without.
+/* growth/round.c -- one growth round: add anchors where gradients are large, remove those of low importance.
 
    statistics --> candidates (from_*.c) --> cells (search.c) --> new anchors ---+
         |                                                                       +--> survivors, then new rows
@@ -69,7 +69,7 @@ typedef struct round_job {
     const growth_def *def;
 } round_job;
 
-/* Statistics that were used begin again. */
+/* Reset the statistics that this round has used. */
 static void reset_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -93,7 +93,7 @@ static void cut_scales(size_t block, size_t begin, size_t end, void *context)
             job->a->scale_log[i * 6 + c] = fminf(job->a->scale_log[i * 6 + c], job->def->shape_log_max);
 }
 
-/* Survivors move up in their order. */
+/* Move surviving rows up, keeping their order. */
 static void compact(const round_job *job, const bool *pruned, size_t *source)
 {
     anchors *a = job->a;
@@ -108,7 +108,7 @@ static void compact(const round_job *job, const bool *pruned, size_t *source)
     a->count = s->count = left;
 }
 
-/* Rows are zero but for what is set here. */
+/* Write the new anchors; all other fields of their rows are already zero. */
 static void append(anchors *a, const new_anchors *n, size_t first)
 {
     for (size_t i = 0; i < n->count; i++) {
@@ -122,7 +122,7 @@ static void append(anchors *a, const new_anchors *n, size_t first)
     }
 }
 
-/* With what was decided: the room is made first, then nothing can fail. */
+/* Apply the decisions: memory is reserved first, after that nothing can fail. */
 static gbt_status apply(anchors *a, growth_stats *stats, const growth_def *def, const new_anchors *n,
                         const bool *pruned, size_t survivors, growth_result *out, gbt_error *err)
 {
@@ -178,7 +178,8 @@ gbt_status growth_round(anchors *a, growth_stats *stats, const growth_def *def, 
         status = find_new_anchors(a, stats, def, &added, err);
     if (status == GBT_OK) {
         size_t most_important, survivors = growth_mark_pruned(stats, def, pruned, &most_important);
-        /* The cap counts the room that pruning makes; it never removes an anchor by itself. */
+        /* Anchors that pruning removes do not count towards the cap; the cap never removes an existing
+           anchor. */
         new_anchors_keep_largest(&added, def->max_anchors > survivors ? def->max_anchors - survivors : 0);
         const bool keep_last = survivors + added.count == 0 && a->count > 0;
         if (keep_last) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/search.c -- a grid as a hash set of cells. */
+/* growth/search.c -- find free cells with candidates: a grid stored as a hash table of cells. */
 #include "growth/search.h"
 
 #include <math.h>
@@ -24,10 +24,10 @@ typedef struct cell {
     int64_t at[3];
     float position[3], scale, gradient; /* of the candidate with the largest gradient */
     size_t feature;                     /* row of new_anchors.feature */
-    atomic_bool occupied;               /* or no place for an anchor */
+    atomic_bool occupied;               /* an anchor is in the cell, or may not be placed there */
 } cell;
 
-/* False where the cell has no 64-bit address, or the position is not finite. */
+/* Cell coordinates of a position; false when they exceed 64 bits or the position is not finite. */
 static bool cell_of(const float position[3], float size, int64_t at[3])
 {
     for (int c = 0; c < 3; c++) {
@@ -55,7 +55,7 @@ static bool same_cell(const int64_t a[3], const int64_t b[3])
     return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Slot of the table that holds the cell, or the empty one where it belongs. */
+/* Slot of the cell in the hash table, or the empty slot where it would be inserted. */
 static size_t find_slot(const growth_search *s, const int64_t at[3])
 {
     size_t slot = cell_hash(at) & (s->table_size - 1);
@@ -77,7 +77,8 @@ static gbt_status grow_table(growth_search *s, gbt_error *err)
     return GBT_OK;
 }
 
-/* A cell keeps the place of its steepest candidate and the maxima of all parents' features. */
+/* Add a candidate to its cell, which keeps the position of the candidate with the largest gradient and the
+   maximum of all parents' features. */
 static void merge_candidate(cell *known, float *best, const growth_candidate *c, const float *feature)
 {
     if (c->gradient > known->gradient) {
@@ -214,7 +215,8 @@ bool growth_search_begin(growth_search *s, int level)
     return true;
 }
 
-/* There is surface; the middle of a cell is where the cell is. */
+/* Position of a cell's new anchor: that of its candidate, which is near surface, or with at_cell_center the
+   cell's centre. */
 static void place_in(const growth_search *s, const cell *c, float position[3])
 {
     for (int k = 0; k < 3; k++)
@@ -238,7 +240,7 @@ static void ask_places(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The cells that are free come first; the table no longer names them. */
+/* Move the free cells to the front; afterwards the hash table is invalid. */
 static void drop_occupied(growth_search *s)
 {
     size_t left = 0;
@@ -278,7 +280,7 @@ void growth_search_free(growth_search *s)
     *s = (growth_search){0};
 }
 
-/* ---- what was found ---- */
+/* ---- the new anchors ---- */
 
 void new_anchors_keep_largest(new_anchors *n, size_t room)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/statistics.c -- importance of anchors and gradients of Gaussians, added up view by view. */
+/* growth/statistics.c -- accumulate the importance of anchors and the gradients of Gaussians over views. */
 #include "growth/statistics.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "base/parallel.h"
 
 enum { GATHER_BLOCK = 1024 /* visible anchors */ };
-static const float gradient_max = 1e18f; /* sums of these stay finite */
+static const float gradient_max = 1e18f; /* a clamp, so that sums stay finite */
 
 const row_field growth_stat_fields[GROWTH_STATS] = {
 #define X(name, label, per_offset, meaning) {label, label, 1, per_offset},
@@ -26,7 +26,7 @@ gbt_status growth_stats_resize(growth_stats *s, size_t count, int offset_count, 
         return base_fail(err, GBT_ERR_ARGUMENT, "statistics: offset_count %d (wanted 1 to %d, constant)",
                          offset_count, ANCHOR_MAX_OFFSETS);
     if (offset_count != s->offset_count)
-        s->capacity = 0; /* no rows are in use: arrays of another width must be made */
+        s->capacity = 0; /* no rows are in use: reallocate, because the row width may differ */
     GBT_TRY(rows_resize(s->field, growth_stat_fields, GROWTH_STATS, offset_count, &s->capacity, s->count,
                         count, "statistics", err));
     s->count = count;
@@ -41,13 +41,13 @@ void growth_stats_free(growth_stats *s)
     memset(s, 0, sizeof *s);
 }
 
-/* Where the statistics of a visible anchor are. */
+/* Row of the statistics of a visible anchor. */
 static size_t stat_row(const growth_stats *s, const frame *f, size_t row)
 {
     return s->count == f->visible_count ? row : f->visible[row];
 }
 
-/* What is added of a view; rows of anchors, and their Gaussians, belong to one block. */
+/* Statistics of one view to add; an anchor's row and its Gaussians belong to a single block. */
 typedef struct gather_job {
     growth_stats *stats;
     const frame *f;
@@ -56,7 +56,7 @@ typedef struct gather_job {
     float t_near;
 } gather_job;
 
-/* The first Gaussian of the visible anchors from `row` on. */
+/* Index of the first Gaussian that belongs to a visible anchor at `row` or later. */
 static size_t first_gaussian(const gather_job *job, size_t row)
 {
     const uint32_t *slot = job->f->tape.slot;
@@ -72,9 +72,9 @@ static size_t first_gaussian(const gather_job *job, size_t row)
     return low;
 }
 
-/* The importance of an anchor is what pictures would miss without it: the share of them that its Gaussians
-   cover. Opacity, which the reference takes, says nothing of Gaussians that are hidden or tiny: a third of
-   all anchors. Of visible anchors [begin, end), and their Gaussians [first, last). */
+/* Add the importance of visible anchors [begin, end) with Gaussians [first, last). Importance is the anchor's
+   share of the image, the sum of blending weights of its Gaussians: what images would lose without it. The
+   reference uses opacity, which cannot recognise hidden or tiny Gaussians, a third of all anchors. */
 static void gather_importance(const gather_job *job, size_t begin, size_t end, size_t first, size_t last)
 {
     const frame *f = job->f;
@@ -87,7 +87,7 @@ static void gather_importance(const gather_job *job, size_t begin, size_t end, s
             s->shown_count[stat_row(s, f, v)] += 1;
         }
     }
-    size_t before = SIZE_MAX; /* Gaussians of an anchor follow each other */
+    size_t before = SIZE_MAX; /* the Gaussians of an anchor are consecutive */
     for (size_t i = first; job->importance == GROWTH_BY_SHARE && i < last; i++) {
         const size_t anchor = stat_row(s, f, f->tape.slot[i] / (uint32_t)s->offset_count);
         if (!(f->blend_weight[i] > 0))
@@ -106,7 +106,7 @@ static bool is_on_screen(const screen_view *s, const gaussians *g, size_t i)
     return screen_touches(s, mean, quat, scale);
 }
 
-/* Axes of the camera, and what a view is wide and high at distance 1. */
+/* Camera axes, and the extent of the view at depth 1. */
 typedef struct gradient_view {
     float rotation[9], center[3], tan_half[2];
     bool looks_forward;
@@ -132,8 +132,9 @@ static void to_camera(const gradient_view *v, const float world[3], float cam[3]
 }
 
 /* The norm of dL/d(projected mean in NDC), from the gradient g of the mean p, both in camera axes: (z tan_x
-   g.x, z tan_y g.y). Where a lens looks to all sides no depth is the distance: there it is that of the mean
-   moved across its ray, with the picture's extent in radians. */
+   g.x, z tan_y g.y). For lenses that look to all sides, where depth along an axis is meaningless, it is the
+   norm of the gradient for motion of the mean perpendicular to its ray, times the image's extent in
+   radians. */
 static float screen_gradient(const gradient_view *v, const float p[3], const float g[3])
 {
     const float *tan_half = v->tan_half;
@@ -147,8 +148,8 @@ static float screen_gradient(const gradient_view *v, const float p[3], const flo
     return sqrtf(larger(far_square * g_square - along * along, 0) * tan_half[0] * tan_half[1]);
 }
 
-/* Does the Gaussian's box touch the cone of a centred pinhole? Or, where a view goes by the screen, its splat
-   the picture? */
+/* Does the Gaussian's bounding box touch the view cone of a centred pinhole, or, for FRAME_SIGHT_BY_ANCHOR
+   views, its splat the image? */
 static bool is_in_cone(const gradient_view *v, const frame *f, size_t i, const float p[3], float t_near)
 {
     if (f->by_screen)
@@ -159,7 +160,7 @@ static bool is_in_cone(const gradient_view *v, const frame *f, size_t i, const f
            fabsf(p[1]) <= v->tan_half[1] * p[2] + reach;
 }
 
-/* Of Gaussians [first, last). */
+/* Add the gradient statistics of Gaussians [first, last). */
 static void gather_gradients(const gather_job *job, const gradient_view *view, size_t first, size_t last)
 {
     const frame *f = job->f;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* growth/statistics.h -- what is gathered step by step of every anchor and Gaussian, to grow and prune by. */
+/* growth/statistics.h -- per-anchor and per-Gaussian statistics, gathered over steps, on which growth and
+   pruning are based. */
 #ifndef GBT_GROWTH_STATISTICS_H
 #define GBT_GROWTH_STATISTICS_H
 
@@ -22,7 +23,7 @@ enum {
 };
 extern const row_field growth_stat_fields[GROWTH_STATS];
 
-/** Gathered between two rounds. Row counts follow the anchors. Start from {0}. */
+/** Statistics since the last round, with one row per anchor. Start from {0}. */
 typedef struct growth_stats {
     size_t count, capacity;
     int offset_count;
@@ -36,32 +37,34 @@ typedef struct growth_stats {
     };
 } growth_stats;
 
-/** Keeps the first min(old, new) rows; new rows are zero. offset_count is fixed while there are rows. On
-    failure nothing changes. */
+/** Resize: the first min(old, new) rows are kept, new rows are zero. offset_count must not change while there
+    are rows. On failure nothing changes. */
 gbt_status growth_stats_resize(growth_stats *s, size_t count, int offset_count, gbt_error *err);
 void growth_stats_free(growth_stats *s);
 
 /** How an anchor's importance is measured. */
 typedef enum growth_importance {
-    GROWTH_BY_SHARE,  /* of the picture that its Gaussians cover: mean over rays of T alpha, over the views
-                         that show it: those before which it is hidden say nothing of its worth */
-    GROWTH_BY_OPACITY /* sum of their decoded opacities, over all views, as the reference takes it */
+    GROWTH_BY_SHARE,  /* share of the image that its Gaussians cover: mean over rays of T alpha, averaged over
+                         the views that show the anchor. Views in which it is occluded say nothing about its
+                         importance and are left out */
+    GROWTH_BY_OPACITY /* sum of the decoded opacities of its Gaussians, over all views in which it is visible,
+                         as in the reference */
 } growth_importance;
 
-/** In which views a Gaussian counts as seen. */
+/** The views in which a Gaussian counts as seen. */
 typedef enum growth_counting {
     GROWTH_COUNT_BLENDED, /* a ray, or a splat's pixel, blended it: any lens */
-    GROWTH_COUNT_IN_CONE /* it touches the cone of a centred pinhole, hidden or not, as the reference takes it
-                          */
+    GROWTH_COUNT_IN_CONE  /* it touches the view cone of a centred pinhole, occluded or not, as in the
+                             reference */
 } growth_counting;
 
-/** Add what the last render of anchors and its adjoint (frame_backward_gaussians()) say. `t_near` of the
-   cone. `s` has a row for each anchor, or for each visible one alone, in their order. Threads: uses all; same
-   bits for every number. */
+/** Add the statistics of the last render of anchors and its adjoint (frame_backward_gaussians()). `t_near` is
+    the near plane of the cone of GROWTH_COUNT_IN_CONE. `s` has a row for each anchor, or only for each
+    visible one, in their order. Threads: uses all; same bits for every number. */
 void growth_stats_gather(growth_stats *s, const frame *f, growth_importance importance,
                          growth_counting counting, float t_near);
 
-/** Mean over the views that saw the Gaussian `slot` (anchor * K + offset); 0 when none did. */
+/** Mean gradient of the Gaussian `slot` (anchor * K + offset) over the views that saw it; 0 when none did. */
 static inline float growth_mean_gradient(const growth_stats *s, size_t slot)
 {
     return s->grad_count[slot] > 0 ? s->grad_accum[slot] / s->grad_count[slot] : 0;

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/activations.h -- exp, tanh and sigmoid in single precision: the same bits on every instruction set,
-   and loops over them vectorise.
+/* anchor/activations.h -- exp, tanh and sigmoid in single precision, with the same bits on every instruction
+   set, and in a form that vectorises in loops.
 
-   Only additions, products, one division and fused multiply-adds in a fixed order, so nothing here depends on
-   the libm of the machine. */
+   They use only additions, products, one division and fused multiply-adds in a fixed order, so results do not
+   depend on the machine's libm. */
 #ifndef GBT_ANCHOR_ACTIVATIONS_H
 #define GBT_ANCHOR_ACTIVATIONS_H
 
 #include <stdint.h>
 #include <string.h>
 
-/* Arguments of exp() and sigmoid() are cut here: exp(-30) sigmoid(-30) is still a normal float, so that a
-   scale is never 0. */
+/* Arguments of exp() and sigmoid() are clamped to +- this: exp(-30) sigmoid(-30) is still a normal float, so
+   a scale is never 0. */
 #define ACTIVATION_LIMIT 30.0f
 
-/** x in [low, high]; a NaN becomes `low`. */
+/** x clamped to [low, high]; NaN becomes `low`. */
 static inline float activation_clamp(float x, float low, float high)
 {
     const float above = x > low ? x : low;
@@ -45,7 +45,7 @@ static inline float activation_exp_parts(float x, float *power)
     return __builtin_fmaf(p * r, r, r);
 }
 
-/** exp of x cut to [-30, 30]; error below 2 ulp. */
+/** exp of x clamped to [-30, 30]; error below 2 ulp. */
 static inline float activation_exp(float x)
 {
     float power;
@@ -53,7 +53,7 @@ static inline float activation_exp(float x)
     return __builtin_fmaf(power, tail, power);
 }
 
-/** 1 / (1 + exp(-x)) with x cut to [-30, 30]. Derivative: s (1 - s). */
+/** 1 / (1 + exp(-x)) with x clamped to [-30, 30]. Derivative: s (1 - s). */
 static inline float activation_sigmoid(float x)
 {
     float power;
@@ -62,7 +62,7 @@ static inline float activation_sigmoid(float x)
     return 1.0f / (1.0f + __builtin_fmaf(power, tail, power));
 }
 
-/** tanh by expm1(2 |x|), accurate relative to the result also near 0. Derivative: 1 - t^2. NaN gives -1. */
+/** tanh through expm1(2 |x|); the relative error is small also near 0. Derivative: 1 - t^2. NaN gives -1. */
 static inline float activation_tanh(float x)
 {
     const float cut = activation_clamp(x, -10.0f, 10.0f); /* tanh(10) rounds to 1 */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/anchors.c -- memory of anchors and decoders, and how a decoder starts. */
+/* anchor/anchors.c -- allocation of anchors and decoders, and initialisation of the decoder. */
 #include "anchor/anchors.h"
 
 #include <math.h>
@@ -50,7 +50,7 @@ void anchors_zero_learned(anchors *a)
 
 static const struct {
     const char *label;
-    size_t outputs; /* for each Gaussian */
+    size_t outputs; /* outputs per Gaussian */
 } network_list[DECODER_NETWORKS] = {
 #define X(id, label, outputs) {label, outputs},
     DECODER_NETWORK_LIST(X)

@@ -2,8 +2,8 @@
 /* anchor/anchors.h -- the anchors of a neural Gaussian scene and the three small networks that decode them
    (Scaffold-GS).
 
-   Raw parameters only: positions never move; offsets, features and log-scales learn. The same struct holds
-   gradients and Adam moments. */
+   Parameters are stored before activations. Positions are fixed; features, offsets and log-scales are
+   trained. The same struct is used for gradients and Adam moments. */
 #ifndef GBT_ANCHOR_ANCHORS_H
 #define GBT_ANCHOR_ANCHORS_H
 
@@ -16,11 +16,11 @@
 
 enum { ANCHOR_FEATURE_DIM = 32, ANCHOR_HIDDEN_DIM = 32, ANCHOR_MAX_OFFSETS = 16 };
 
-/** Every array of the anchors, listed once: memory, gradients, Adam moments and files are loops over it. The
-    position never moves; the others learn (train/learnables.c has their rates).
+/** Every array of the anchors, listed once: allocation, gradients, Adam moments and files are loops over this
+    list. The position is fixed; the others are trained (rates: train/learnables.c).
 
-    X(name, label, width, per_offset, meaning): label is for people; a row has `width` floats, per_offset: for
-    each of the K Gaussians. */
+    X(name, label, width, per_offset, meaning): label is the name in messages; a row has `width` floats, or
+    with per_offset `width` floats for each of the K Gaussians. */
 #define ANCHOR_FIELD_LIST(X)                                                                                 \
     X(position, POSITION, "position", 3, false, "scene-local units")                                         \
     X(feature, FEATURE, "feature", ANCHOR_FEATURE_DIM, false, "input of the networks")                       \
@@ -32,7 +32,7 @@ typedef enum anchor_field {
     ANCHOR_FIELD_LIST(X)
 #undef X
         ANCHOR_FIELDS,
-    ANCHOR_FIRST_LEARNED = ANCHOR_FEATURE /* this one and all that follow */
+    ANCHOR_FIRST_LEARNED = ANCHOR_FEATURE /* this field and all that follow are trained */
 } anchor_field;
 
 extern const row_field anchor_fields[ANCHOR_FIELDS];
@@ -50,34 +50,34 @@ typedef struct anchors {
     };
 } anchors;
 
-/** Floats that one anchor has in a field. */
+/** Number of floats per anchor in a field. */
 static inline size_t anchors_width(const anchors *a, int field)
 {
     return row_field_width(&anchor_fields[field], a->offset_count);
 }
 
-/** Keeps the first min(old, new) rows; new rows are zero; offset_count must be set first. On failure nothing
-    changes. */
+/** Resize: the first min(old, new) rows are kept, new rows are zero; offset_count must be set before. On
+    failure nothing changes. */
 gbt_status anchors_resize(anchors *a, size_t count, gbt_error *err);
 void anchors_free(anchors *a);
 
-/** Copy every row of every field; both have the same shape. */
+/** Copy every row of every field; both must have the same shape. */
 void anchors_copy(anchors *to, const anchors *from);
 
-/** Every field that learns becomes 0: gradients before they are added to. */
+/** Set every trained field to 0: clears gradients before accumulation. */
 void anchors_zero_learned(anchors *a);
 
 /* ---- networks ---- */
 
-/** Inputs: feature(32), unit direction camera -> anchor (3), distance if has_distance (1). Hidden 32, ReLU.
-    Networks: opacity K tanh, shape 7K, colour 3K sigmoid. */
+/** The three networks. Inputs: feature (32), unit direction from camera to anchor (3), distance if
+    has_distance (1). Hidden 32, ReLU. Networks: opacity K tanh, shape 7K, colour 3K sigmoid. */
 typedef struct decoder {
     int offset_count;
     bool has_distance;
-    float distance_scale; /* the distance input is |x - c| * distance_scale: 1 / median training distance, or
+    float distance_scale; /* the distance input is |x - c| * distance_scale; 1 / median training distance, or
                              1 */
-    float distance_min, distance_max; /* trained range (scaled): the input is cut to [min / 2, 2 max].
-                                         decoder_init() gives 0, infinity */
+    float distance_min, distance_max; /* range of scaled distances in training: the input is clamped to [min /
+                                         2, 2 max]. decoder_init() sets 0 and infinity */
     size_t param_count;               /* all weights and biases, one flat array */
     float *params; /* owned; layout: for opacity, shape, colour: W1 [32][in], b1 [32], W2 [out][32], b2 [out]
                     */
@@ -87,8 +87,8 @@ typedef struct decoder {
 gbt_status decoder_init(decoder *d, int offset_count, bool has_distance, uint64_t seed, gbt_error *err);
 void decoder_free(decoder *d);
 
-/** The networks, listed once, in the order of their parameters: X(id, label, outputs per Gaussian). They have
-    learning rates of their own (train/learnables.c). */
+/** The networks, listed once, in the order of their parameters: X(id, label, outputs per Gaussian). Each has
+    its own learning rate (train/learnables.c). */
 #define DECODER_NETWORK_LIST(X)                                                                              \
     X(OPACITY, "opacity", 1)                                                                                 \
     X(SHAPE, "shape", 7)                                                                                     \
@@ -101,14 +101,14 @@ enum {
         DECODER_NETWORKS
 };
 
-/** Outputs for each Gaussian. */
+/** Outputs per Gaussian. */
 enum {
 #define X(id, label, outputs) DECODER_##id##_OUTPUTS = outputs,
     DECODER_NETWORK_LIST(X)
 #undef X
 };
 
-/** A network, and which of decoder.params are its. */
+/** A network and its range in decoder.params. */
 typedef struct decoder_network {
     const char *label;
     size_t outputs; /* for each Gaussian */

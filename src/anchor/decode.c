@@ -5,9 +5,10 @@
         --> anchors that have Gaussians --> shape and colour networks --> packed arrays
                             (kept for the adjoint)
 
-   Two passes over the same chunks: the first decides which Gaussians exist, the second computes the rest of
-   those straight into place. Inputs, but for directions and distances, and hidden layers are computed again
-   for each pass, and for the adjoint: they take less time to compute than to write and to read back. */
+   Two passes over the same chunks: the first evaluates opacities and so decides which Gaussians exist; the
+   second computes everything else of those, directly at their final positions. Inputs (except directions and
+   distances) and hidden layers are recomputed in each pass and in the adjoint, because that is faster than
+   storing and loading them. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -83,7 +84,8 @@ static void decide_block(size_t block, size_t begin, size_t end, void *context)
         decide_chunk(context, place, smaller_size(place + DECODE_CHUNK, end));
 }
 
-/* Logits of the kept Gaussians into their places in the tape, and what needs no activation into `out`. */
+/* Copy the logits of the kept Gaussians to their positions in the tape, and values without an activation to
+   `out`. */
 static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, const float *shape,
                           const float *color, const float *extent, uint16_t *row_of)
 {
@@ -105,7 +107,7 @@ static size_t gather_kept(const forward_job *job, size_t begin, size_t rows, con
             const float *s = shape + r * shape_stride + k * DECODER_SHAPE_OUTPUTS,
                         *c = color + r * color_stride + k * DECODER_COLOR_OUTPUTS;
             kept[KEPT_ALPHA * stride + g] = alpha[k];
-            /* KEPT_QUAT follows KEPT_SIGMOID as the network's outputs do. */
+            /* KEPT_QUAT follows KEPT_SIGMOID, in the order of the network's outputs. */
             for (int i = 0; i < DECODER_SHAPE_OUTPUTS; i++)
                 kept[(size_t)(KEPT_SIGMOID + i) * stride + g] = s[i];
             for (int i = 0; i < DECODER_COLOR_OUTPUTS; i++)
@@ -217,7 +219,7 @@ static gbt_status reserve_places(decode_tape *tape, size_t visible_count, gbt_er
     if (places <= tape->capacity && tape->alpha != NULL)
         return GBT_OK;
     const size_t capacity = decode_tiled(places + places / 4);
-    float *block = /* one owner (alpha), three arrays */
+    float *block = /* one allocation for three arrays, owned by `alpha` */
         mem_alloc(capacity, (ALPHA_STRIDE + 1 + VIEW_COUNT) * sizeof *block, "decode tape", err);
     if (block == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_activations.c -- gradients of Gaussians back through the activations: to the outputs of the
-   networks, to offsets and to log-scales.
+/* anchor/decode_activations.c -- adjoint of the activations: from gradients of Gaussians to those of network
+   outputs, offsets and log-scales.
 
-   BATCH Gaussians at a time: what their anchors have is put side by side, the arithmetic is in lanes, and the
-   results go to their rows. */
+   It handles BATCH Gaussians at a time: values of their anchors are gathered, the arithmetic runs in SIMD
+   lanes, and the results are scattered to the rows of the anchors. */
 #include <math.h>
 #include <string.h>
 
@@ -12,7 +12,7 @@
 
 enum { BATCH = 64 };
 
-/* Of each Gaussian of a batch. */
+/* Inputs of a batch, one value per Gaussian. */
 typedef struct batch_in {
     float position[3][BATCH], offset[3][BATCH], extent[6][BATCH];
 } batch_in;
@@ -22,7 +22,7 @@ typedef struct batch_out {
         color[DECODER_COLOR_OUTPUTS][BATCH];
 } batch_out;
 
-/* Means and offsets. */
+/* Adjoint of means: gradients of offsets and of the offset log-scales. */
 FASTEST_CLONE static void back_means(const batch_in *restrict in, const gaussians *d, size_t g, size_t count,
                                      batch_out *restrict out)
 {
@@ -38,8 +38,8 @@ FASTEST_CLONE static void back_means(const batch_in *restrict in, const gaussian
     }
 }
 
-/* Scales and log-scales. A scale that was raised to DECODE_SCALE_RATIO of the largest moves with that one
-   alone. */
+/* Adjoint of scales: gradients of log-scales and network outputs. A scale that was raised to
+   DECODE_SCALE_RATIO of the largest depends only on the largest. */
 FASTEST_CLONE static void back_scales(const batch_in *restrict in, const float *restrict kept, size_t stride,
                                       const gaussians *d, size_t g, size_t count, batch_out *restrict out)
 {
@@ -63,7 +63,7 @@ FASTEST_CLONE static void back_scales(const batch_in *restrict in, const float *
         const float *restrict sigmoid = kept + (size_t)(KEPT_SIGMOID + c) * stride;
         for (size_t i = 0; i < count; i++) {
             const float s = scale[c][i], more = s == largest[i] ? passed_on[i] : 0.0f;
-            passed_on[i] -= more; /* the first of several equal ones has it */
+            passed_on[i] -= more; /* the first of several equal largest scales gets the gradient */
             const float scaled = (s < least[i] ? 0.0f : slope[c][i] + more) * s;
             out->scale_log[3 + c][i] = scaled;
             out->shape[c][i] = scaled * (1.0f - sigmoid[i]);
@@ -101,8 +101,8 @@ FASTEST_CLONE static void back_colors(const float *restrict kept, size_t stride,
         out->alpha[i] = d_opacity[i] * (1.0f - alpha[i] * alpha[i]);
 }
 
-/* Gaussians [g, g + count): which row each belongs to, from row `r` on, and what its anchor has. Returns the
-   last one's row. */
+/* Gather the rows and anchor values of Gaussians [g, g + count), starting the search at row `r`. Returns the
+   row of the last one. */
 static size_t gather(const decode_slopes *s, size_t g, size_t count, size_t r, batch_in *in,
                      size_t row[BATCH], size_t k[BATCH])
 {

@@ -2,8 +2,8 @@
 /* anchor/decode_backward.c -- dL/dGaussians -> dL/danchors and dL/dnetworks, or dL/dcamera: the adjoint of
    decode.c, over the same chunks.
 
-   Rows of the anchors' gradient belong to one chunk each. The networks' gradient, or the camera's, is one
-   record per block, added in block order. */
+   Each row of the anchors' gradient belongs to one chunk. Gradients of the networks, or of the camera, are
+   summed per block into a record, and the records are added in block order. */
 #include "anchor/decode.h"
 
 #include <math.h>
@@ -17,8 +17,8 @@
 
 enum { OUT_WIDTH_MAX = ALPHA_STRIDE + SHAPE_STRIDE_MAX + COLOR_STRIDE_MAX };
 
-/* A block's record: gradients of W1 transposed, [INPUT_STRIDE][HIDDEN_STRIDE], with the bias as a row; then
-   of W2 and b2 per network. */
+/* Layout of a block's record: the gradient of W1 transposed, [INPUT_STRIDE][HIDDEN_STRIDE], with b1 as one
+   row; then those of W2 and b2 per network. */
 typedef struct record_layout {
     size_t weight_first[DECODER_NETWORKS], bias_first[DECODER_NETWORKS], size;
 } record_layout;
@@ -31,8 +31,8 @@ typedef struct backward_job {
     record_layout record;
     const decode_tape *tape;
     const gaussians *d_gaussians;
-    anchors *d_anchors; /* with d_params; NULL: the camera's gradient alone is wanted */
-    bool packed;        /* d_anchors has a row for each visible anchor */
+    anchors *d_anchors; /* wanted together with d_params; NULL: only the camera's gradient is wanted */
+    bool packed;        /* d_anchors has rows for visible anchors only */
     float *d_params;
     const decoder *d;
     double *d_camera; /* [block_count][3]; NULL: not wanted */
@@ -53,7 +53,7 @@ static record_layout record_layout_of(const decode_layout *layout)
     return record;
 }
 
-/* Adds `rows` rows of `count` values, `stride` apart, to `sum`. */
+/* Add `rows` rows of `count` values, `stride` apart, to `sum`. */
 FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, size_t stride, size_t count,
                                    float *restrict sum)
 {
@@ -62,7 +62,7 @@ FASTEST_CLONE static void add_rows(const float *restrict values, size_t rows, si
             sum[i] += values[r * stride + i];
 }
 
-/* Logit gradients back through the second layer and the ReLU. */
+/* Propagate the gradients of logits back through the second layer and the ReLU. */
 static void hidden_backward(const backward_job *job, const float *hidden, size_t tiled, const float *d_out,
                             float *d_hidden)
 {
@@ -81,8 +81,8 @@ static void hidden_backward(const backward_job *job, const float *hidden, size_t
                                                .c_row = HIDDEN_STRIDE});
 }
 
-/* dL/dcamera of one anchor from the gradient of its direction and distance: moving the camera is
-   moving every anchor the other way. */
+/* Contribution of one anchor to dL/dcamera, through its direction and distance: moving the camera is moving
+   the anchor the opposite way. */
 static void view_backward(const backward_job *job, size_t anchor, const float *d_hidden, double d_camera[3])
 {
     double d_input[4] = {0}, offset[3], square = 0, along = 0;
@@ -107,7 +107,7 @@ static void view_backward(const backward_job *job, size_t anchor, const float *d
         d_camera[c] -= (d_input[c] - offset[c] * (along / square) + offset[c] * d_distance) / distance;
 }
 
-/* The networks' gradient of a chunk, added to a record. */
+/* Add the networks' gradient of a chunk to a record. */
 static void networks_backward(const backward_job *job, size_t rows, const float *input, const float *hidden,
                               const float *d_out, const float *d_hidden, float *record)
 {
@@ -223,14 +223,15 @@ static void backward_block(size_t block, size_t begin, size_t end, void *context
             chunk_backward(job, place, tape->filled[place / DECODE_CHUNK], record, d_camera);
 }
 
-/* Entries [entry, entry + count) of the records, summed in block order. */
+/* Sum entries [entry, entry + count) of the records in block order. */
 static void sum_records(const backward_job *job, size_t entry, size_t count, float *sum)
 {
     memset(sum, 0, count * sizeof *sum);
     add_rows(job->tape->block_grad + entry, job->block_count, job->record.size, count, sum);
 }
 
-/* Rows of W1 transposed, the bias among them, then rows of W2, each with its bias. */
+/* Sum the records: first the rows of W1 transposed, including the bias, then the rows of W2, each with its
+   bias. */
 static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -262,7 +263,7 @@ static void reduce_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* What both adjoints begin with; after it tape->kept_count may be 0, and nothing is left to do. */
+/* Common start of both adjoints; if tape->kept_count is 0 afterwards, there is nothing to do. */
 static gbt_status open_job(const anchors *a, const decoder *d, decode_tape *tape,
                            const gaussians *d_gaussians, backward_job *job, gbt_error *err)
 {

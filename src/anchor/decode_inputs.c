@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_inputs.c -- what the networks see of an anchor (its feature, and where it is seen from), and
-   their hidden layers. */
+/* anchor/decode_inputs.c -- inputs of the networks (feature, viewing direction, distance) and their hidden
+   layers. */
 #include <math.h>
 #include <string.h>
 

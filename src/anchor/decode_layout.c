@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_layout.c -- pack the decoder's networks for the kernels. */
+/* anchor/decode_layout.c -- pack the network weights into the layout of the kernels. */
 #include "anchor/decode_layout.h"
 
 #include <string.h>

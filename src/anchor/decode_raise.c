@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/decode_raise.c -- bring Gaussians back to where gradients reach them. */
+/* anchor/decode_raise.c -- raise opacities that have fallen below 0, where Gaussians have no gradient. */
 #include "anchor/decode.h"
 
 #include <math.h>

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/dense.h -- the arithmetic of the decoder that is worth vector instructions: one matrix product and
-   the activations.
+/* anchor/dense.h -- the vectorised arithmetic of the decoder: a matrix product and the activations.
 
-   The implementations (plain C, NEON, AVX2, AVX-512) give the same bits: every sum is a chain of fused
-   multiply-adds in the order of k. */
+   All implementations (plain C, NEON, AVX2, AVX-512) give the same bits: every sum is a chain of fused
+   multiply-adds in the order of the summation index. */
 #ifndef GBT_ANCHOR_DENSE_H
 #define GBT_ANCHOR_DENSE_H
 
@@ -24,7 +23,7 @@ typedef struct dense_product {
     size_t b_row;
     const float *bias; /* [n] or NULL */
     bool relu;         /* max(result, 0); a NaN becomes 0 */
-    const float *gate; /* [m][c_row] or NULL: 0 where this is not above 0, the adjoint of a ReLU */
+    const float *gate; /* [m][c_row] or NULL: the result is 0 where this is not > 0: the adjoint of a ReLU */
     float *c;
     size_t c_row;
 } dense_product;
@@ -34,8 +33,8 @@ typedef struct dense_kernels {
     void (*exp)(float *x, size_t count); /* these four work in place; see activations.h */
     void (*tanh)(float *x, size_t count);
     void (*sigmoid)(float *x, size_t count);
-    /** Quaternions to length 1, and one over the old length. Lengths below 1e-12 give (1, 0, 0, 0) and 0.
-        Components are cut to +-1e18. */
+    /** Normalise quaternions, and return one over the old length. Lengths below 1e-12 give (1, 0, 0, 0) and
+        0. Components are clamped to +-1e18. */
     void (*normalize)(float *w, float *x, float *y, float *z, float *inverse_length, size_t count);
 } dense_kernels;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/dense_elementwise.inc.h -- loops over activations.h; compiled once per instruction set, the compiler
-   vectorises them. */
+/* anchor/dense_elementwise.inc.h -- loops over activations.h, compiled once per instruction set and
+   vectorised by the compiler. */
 #include <math.h>
 
 #include "anchor/activations.h"
@@ -27,7 +27,7 @@ static void dense_sigmoid(float *restrict x, size_t count)
 static void dense_normalize(float *restrict w, float *restrict x, float *restrict y, float *restrict z,
                             float *restrict inverse_length, size_t count)
 {
-    const float limit = 1e18f; /* four squares of it are still finite */
+    const float limit = 1e18f; /* the sum of four squares of it is still finite */
     for (size_t i = 0; i < count; i++) {
         const float a = activation_clamp(w[i], -limit, limit), b = activation_clamp(x[i], -limit, limit);
         const float c = activation_clamp(y[i], -limit, limit), d = activation_clamp(z[i], -limit, limit);

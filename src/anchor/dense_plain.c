@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/dense_plain.c -- the decoder's arithmetic in plain C: the definition, and the choice between the
-   implementations. */
+/* anchor/dense_plain.c -- the decoder's arithmetic in plain C, which defines the results, and the choice of
+   an implementation. */
 #include "anchor/dense_elementwise.inc.h"
 #include "base/cpu.h"
 

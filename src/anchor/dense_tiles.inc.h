@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/dense_tiles.inc.h -- the matrix product as register tiles; the including file says what a vector is.
+/* anchor/dense_tiles.inc.h -- the matrix product in register tiles; the including file defines the vector
+   type.
 
    Needs: vec, LANES, TILE_ROWS (rows of c held in registers, times two vectors), vec_load, vec_store,
    vec_set1, vec_zero, vec_fma, vec_max and vec_where_above_zero(gate, x). */
@@ -20,8 +21,8 @@ static inline __attribute__((always_inline)) void tile(const int rows, const int
             sum[i][j] = job->bias != NULL ? vec_load(job->bias + column + j * LANES)
                                           : vec_load(c + (size_t)i * job->c_row + j * LANES);
 
-    /* One pointer for three rows: x86 addresses reach base, base + stride and base + 2 stride, so ten rows
-       cost four registers. */
+    /* One pointer per three rows: x86 addressing modes reach base, base + stride and base + 2 stride, so ten
+       rows need only four registers. */
     const float *a[(TILE_ROWS + 2) / 3];
 #pragma GCC unroll 16
     for (int i = 0; i < (rows + 2) / 3; i++)
@@ -50,7 +51,7 @@ static inline __attribute__((always_inline)) void tile(const int rows, const int
 #pragma GCC unroll 2
         for (int j = 0; j < vectors; j++) {
             if (job->relu)
-                sum[i][j] = vec_max(sum[i][j], vec_zero()); /* second operand wins against NaN */
+                sum[i][j] = vec_max(sum[i][j], vec_zero()); /* NaN gives the second operand, 0 */
             if (job->gate != NULL)
                 sum[i][j] = vec_where_above_zero(
                     vec_load(job->gate + (row + (size_t)i) * job->c_row + column + j * LANES), sum[i][j]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/init.c -- anchors from balls, voxels or points, and their first scale (Yang 2026).
+/* anchor/init.c -- initial anchors from balls, voxels or points, and their initial scales (Yang 2026).
 
    points --> balls (GBAI, eq 28), voxels (eq 12) or some points --> centres
         --> spacing (+ ball radius: GBSP, eqs 29-34) --> log-scales */
@@ -52,7 +52,7 @@ static gbt_status check_def(const anchor_init_def *def, gbt_error *err)
 
 static const double baseline_spacing_min = 3.1622776601683794e-4; /* sqrt(1e-7) */
 
-/* The cap wins over floor and factor. */
+/* The cap takes precedence over floor and factor. */
 static double first_scale(double scale, double floor_scale, double factor, double most)
 {
     return fmin(factor * fmax(scale, floor_scale), most);
@@ -76,7 +76,7 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
     return status;
 }
 
-/* The baseline. A lone anchor has no spacing and takes the voxel size. */
+/* The baseline rule. A single anchor has no spacing and uses the voxel size. */
 static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
 {
     const double factor = (double)def->scale_factor, most = (double)def->scale_max,
@@ -103,7 +103,8 @@ typedef struct prior_job {
     anchors *a;
     const anchor_init_def *def;
     const float *radius;
-    const double *squared; /* [count], to the nearest other centre; infinite for a lone one */
+    const double *squared; /* [count], squared distance to the nearest other centre; infinite for a single
+                              one */
     double floor_scale;
 } prior_job;
 
@@ -117,7 +118,7 @@ static void prior_block(size_t block, size_t begin, size_t end, void *context)
         const double square = job->squared[i];
         const bool spaced = square > 0 && square < HUGE_VAL;
         const double near =
-            spaced ? sqrt(square) : radius; /* lone or coincident: the radius is all that is known */
+            spaced ? sqrt(square) : radius; /* single or coincident anchors have no spacing: use the radius */
         const double clipped = fmin(fmax(radius, (double)def->clip_min * near), (double)def->clip_max * near);
         const double fused = (double)def->fusion * near + (1.0 - (double)def->fusion) * clipped;
         set_scale(job->a, i,
@@ -135,7 +136,7 @@ static gbt_status scale_from_balls(anchors *a, const float *radius, const anchor
             ? GBT_ERR_NO_MEMORY
             : points_find_nearest(a->position, a->count, NULL, a->count, index, squared, err);
     if (status == GBT_OK) {
-        /* eps of eq 34 is s_min of eq 21: no scale is finer than the finest ball. */
+        /* eps of eq 34 is s_min of eq 21, so that no scale is below the radius of the smallest ball. */
         prior_job job = {.a = a,
                          .def = def,
                          .radius = radius,
@@ -157,7 +158,7 @@ static gbt_status place(anchors *a, const float *center, size_t count, gbt_error
     return GBT_OK;
 }
 
-/* `wanted` of the points, each set of so many with equal chances, in their order. */
+/* A uniformly random subset of `wanted` points, in input order. */
 static gbt_status choose_points(const float *position, size_t count, size_t wanted, uint64_t seed,
                                 float **out, gbt_error *err)
 {
@@ -173,7 +174,7 @@ static gbt_status choose_points(const float *position, size_t count, size_t want
     return GBT_OK;
 }
 
-/* How many anchors the kinds that can make any number are to make. */
+/* Number of anchors for the kinds that can make any number of them. */
 static gbt_status count_wanted(const float *position, const float *color, size_t count,
                                const anchor_init_def *def, size_t *out, gbt_error *err)
 {
@@ -187,7 +188,7 @@ static gbt_status count_wanted(const float *position, const float *color, size_t
     return GBT_OK;
 }
 
-/* Where the anchors are, and the balls that they stand for, if any. */
+/* Positions of the anchors, and the balls that they represent, if any. */
 static gbt_status find_centers(const float *position, const float *color, size_t count,
                                const anchor_init_def *def, balls *found, float **centers,
                                size_t *center_count, gbt_error *err)

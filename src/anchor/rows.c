@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/rows.c -- memory of the arrays that have one row per anchor. */
+/* anchor/rows.c -- allocation and reordering of arrays that have one row per anchor. */
 #include "anchor/rows.h"
 
 #include <string.h>
@@ -69,7 +69,8 @@ static void keep_rows(size_t f, size_t begin, size_t end, void *context)
     const keep_job *job = context;
     const size_t width = row_field_width(&job->fields[f], job->offset_count);
     float *rows = job->arrays[f];
-    for (size_t i = 0; i < job->count; i++) /* a row comes from its own place or from further on */
+    for (size_t i = 0; i < job->count; i++) /* source[i] >= i, so moving rows in ascending order overwrites
+                                               nothing needed */
         if (job->source[i] != i)
             memcpy(rows + i * width, rows + job->source[i] * width, width * sizeof *rows);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* anchor/rows.h -- float arrays that have one row per anchor and grow together, and what a row of each is. */
+/* anchor/rows.h -- float arrays with one row per anchor that are resized together, and the description of
+   their rows. */
 #ifndef GBT_ANCHOR_ROWS_H
 #define GBT_ANCHOR_ROWS_H
 
@@ -11,10 +12,10 @@
 enum { ROWS_FIELDS_MAX = 16, ROWS_DIMS_MAX = 3 };
 
 typedef struct row_field {
-    const char *name;  /* of its section in files */
-    const char *label; /* for people */
-    size_t width;      /* floats per anchor, or */
-    bool per_offset;   /* for each of the K Gaussians of an anchor */
+    const char *name;  /* name of its section in files */
+    const char *label; /* name in messages */
+    size_t width;      /* floats per anchor, or, with per_offset, */
+    bool per_offset;   /* floats for each of the anchor's K Gaussians */
 } row_field;
 
 /** Floats in one row. */
@@ -28,10 +29,10 @@ static inline size_t row_field_width(const row_field *field, int offset_count)
 int row_field_dims(const row_field *field, size_t count, size_t offset_count, size_t dims[ROWS_DIMS_MAX]);
 
 /**
- * Make every array hold `count` rows: the first min(used, count) are kept, the others are zero.
+ * Resize every array to `count` rows: the first min(used, count) are kept, the others are zero.
  *
  * @param arrays      [in,out] [field_count], owned by the caller, freed by mem_free(); NULL at the start
- * @param fields      [in] [field_count] what a row of each is; at most ROWS_FIELDS_MAX
+ * @param fields      [in] [field_count] description of the rows; at most ROWS_FIELDS_MAX
  * @param capacity    [in,out] rows allocated; grows by half at least
  * @return GBT_OK or GBT_ERR_NO_MEMORY: then nothing has changed
  */

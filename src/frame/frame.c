@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/frame.c -- one view of a model: rays, what is visible, its Gaussians, tree, trace; and back. */
+/* frame/frame.c -- render one view of a model (rays, visibility, Gaussians, tree, trace), and the adjoint. */
 #include "frame/frame.h"
 
 #include <math.h>
@@ -18,7 +18,8 @@
 #include "trace/pose_gradient.h"
 
 enum { SKY_BLOCK = 4096 };
-static const float least_through = 0.01f; /* pixels with less of the sky say nothing of it */
+static const float least_through = 0.01f; /* pixels with less transmittance are left out of the sky's
+                                             gradient */
 
 enum { VALID_BLOCK = 1 << 15 /* pixels */ };
 
@@ -33,17 +34,18 @@ void frame_times_add(frame_times *sum, const frame_times *more)
     stage_add(&sum->decode_adjoint, more->decode_adjoint);
 }
 
-/* ---- render and back ---- */
+/* ---- render and adjoint ---- */
 
-/* A variance in pixels of the picture, in pixels of the camera. */
+/* Convert a variance from pixels of the full image to pixels of the camera, which may have only every n-th of
+   them. */
 static float pixel_variance(const frame *f, float variance)
 {
     const float step = (float)(f->draw.pixel_step > 1 ? f->draw.pixel_step : 1);
     return variance / (step * step);
 }
 
-/* Variance by which splats are dilated, camera pixels^2; 0 with other renderers, and when Gaussians were
-   widened already. */
+/* Variance by which splats are dilated, camera pixels^2; 0 with other renderers, and when the Gaussians were
+   already widened. */
 static float dilation_of(const frame *f)
 {
     return f->draw.renderer == GBT_RENDERER_RASTER && !f->widened
@@ -51,10 +53,10 @@ static float dilation_of(const frame *f)
                : 0;
 }
 
-/* Of every Gaussian of the last render; NULL: no limit. */
+/* Smallest pixel size of every Gaussian of the last render; NULL: no limit. */
 static const float *pixel_min_of(const frame *f) { return f->pixel_limited ? f->pixel_min : NULL; }
 
-/* f->gaussians as wide as the view's pixels make them. */
+/* Widen f->gaussians by the view's pixel footprint. */
 static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
 {
     if (f->pixel_limited) {
@@ -67,13 +69,14 @@ static gbt_status widen(frame *f, frame_subject subject, gbt_error *err)
                              &f->wide, err);
 }
 
-/* What a rasterizer could draw. */
+/* Whether a rasterizer could draw the shot. */
 static bool is_plain_view(const ray_shot *shot)
 {
     return shot->given == NULL && shot->aperture_radius <= 0 && raster_takes(&shot->camera);
 }
 
-/* Everything up to the tree, and f->rays through the middle of the aperture. `tracer` is optional. */
+/* All stages up to building the tree, and f->rays through the middle of the aperture. `tracer` is
+   optional. */
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
                           const trace_settings *settings, const frame_tracer *tracer, gbt_error *err)
 {
@@ -82,7 +85,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     middle.aperture_radius = 0;
     f->camera = shot->camera;
     GBT_TRY(ray_image_from_shot(&middle, 0, &f->rays, err));
-    const camera_lens *lens = f->rays.lens.fx > 0 ? &f->rays.lens : NULL; /* NULL: the rays were given */
+    const camera_lens *lens = f->rays.lens.fx > 0 ? &f->rays.lens : NULL; /* NULL when the rays were given */
     memset(f->half_fov_tan, 0, sizeof f->half_fov_tan);
     if (lens != NULL)
         camera_lens_half_fov_tan(lens, shot->camera.width, shot->camera.height, f->half_fov_tan);
@@ -98,8 +101,8 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         f->screen = screen_of(&shot->camera, (double)settings->t_near);
     f->view = footprint_view_with(&shot->camera, lens);
     f->pixel_limited = f->draw.anchor_pixel != NULL && subject.cloud == NULL;
-    f->widened = f->draw.footprint > 0 && shot->given == NULL; /* nobody says how wide given rays are */
-    /* where an opaque Gaussian falls to alpha_min */
+    f->widened = f->draw.footprint > 0 && shot->given == NULL; /* given rays have no known width */
+    /* sigmas: where the response of an opaque Gaussian falls to alpha_min */
     const visible_reach extent = {
         .sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
         .width = sqrtf(f->widened ? pixel_variance(f, f->draw.footprint) : dilation_of(f)),
@@ -109,7 +112,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->draw.chance,
                          &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = stage_lap(&clock);
-    /* A Gaussian below alpha_min is never blended and so has no gradient: it need not be made. */
+    /* A Gaussian with opacity below alpha_min is never blended and has no gradient, so it is not made. */
     if (subject.cloud != NULL)
         GBT_TRY(plain_forward(subject.cloud, f->eye, f->visible, f->visible_count, &f->gaussians, err));
     else
@@ -188,7 +191,7 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     return GBT_OK;
 }
 
-/* Trace every sample and add them up, in order, in double. */
+/* Trace all samples and add them, in order, in double. */
 static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_tracer *tracer, double *sum,
                                 gbt_error *err)
 {
@@ -235,7 +238,7 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
 
 void frame_widen_exact(const frame *f, size_t i, double field[GAUSSIANS_FIELD_COUNT])
 {
-    footprint_gaussian g; /* the first fields, in their order */
+    footprint_gaussian g; /* its fields are the first fields of GAUSSIANS_FIELDS, in order */
     if (!f->widened)
         return;
     memcpy(&g, field, sizeof g);
@@ -347,7 +350,7 @@ typedef struct valid_job {
     const ray_image *rays;
     const unsigned char *photo;
     unsigned char *out;
-    atomic_bool missing; /* a ray */
+    atomic_bool missing; /* whether a pixel has no ray */
 } valid_job;
 
 static void look_for_missing(size_t block, size_t begin, size_t end, void *context)

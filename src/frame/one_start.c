@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/one_start.c -- for each Gaussian the line of the image that takes its mean, and the camera's place
-   then. */
+/* frame/one_start.c -- for each Gaussian, find the image line (row or column) that sees its mean, and shift
+   it by the camera's motion at that time. */
 #include "frame/one_start.h"
 
 #include <math.h>
@@ -11,7 +11,8 @@
 
 enum {
     MOVE_BLOCK = 1024, /* Gaussians */
-    STEPS = 3          /* each leaves the share of the image that the motion moves a point by */
+    STEPS = 3          /* iterations; each multiplies the error by the share of the image that a point moves
+                          by during read-out */
 };
 
 typedef struct move_job {
@@ -22,7 +23,7 @@ typedef struct move_job {
     gaussians *g;
 } move_job;
 
-/* The line of the image that takes a point, or the edge nearest to it; -1 when the camera does not see it. */
+/* Image line that exposes a point, or the nearest edge; -1 when the camera does not see it. */
 static int find_line(const move_job *job, const double point[3])
 {
     const int axis = job->camera->shutter == GBT_CAMERA_SHUTTER_ROWS;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/one_start.h -- what a camera sees that moves while it is read out, by rays that start at one point:
-   an approximation, for training. */
+/* frame/one_start.h -- approximate a rolling shutter by rays with a common origin and moved Gaussians, for
+   training. */
 #ifndef GBT_FRAME_ONE_START_H
 #define GBT_FRAME_ONE_START_H
 
@@ -10,13 +10,14 @@
 #include "gbtrace/status.h"
 
 /**
- * Move each Gaussian as the camera moves, the other way: by what lies between the centre of the camera's own
- * pose and where the camera is when the mean of the Gaussian is taken. From the former, the mean is then
- * where it is from the latter. What the camera moves while the rest of the Gaussian is taken is left out.
+ * Translate each Gaussian by the difference between the centre of the camera's own pose and the camera's
+ * position at the time when the Gaussian's mean is exposed. Seen from that centre, the mean is then where the
+ * moving camera saw it. The motion of the camera while the rest of the Gaussian is exposed is ignored.
  *
- * @param camera with a rolling shutter; Gaussians that it does not see stay
+ * @param camera has a rolling shutter; Gaussians that it does not see stay
  * @param lens   its lens, prepared
- * @param g      [in,out] means; the derivative of a moved mean by the mean is taken to be 1
+ * @param g      [in,out] their means are changed; adjoints take the derivative of the moved mean by the mean
+ *                        as the identity
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count. Cost: about 60 ns per Gaussian.
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/plain.c -- colours from spherical harmonics for one eye, and their adjoint. */
+/* frame/plain.c -- view-dependent colours from spherical harmonics, and their adjoint. */
 #include "frame/plain.h"
 
 #include <math.h>
@@ -20,7 +20,7 @@ typedef struct plain_job {
     gaussian_cloud *d_cloud;
 } plain_job;
 
-/* Y at the direction from the eye to Gaussian `from`. */
+/* Spherical harmonics at the direction from the eye to Gaussian `from`. */
 static void basis_of(const plain_job *job, size_t from, float y[GAUSSIAN_SH_COUNT])
 {
     double d[3], square = 0;

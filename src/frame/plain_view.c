@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/plain_view.c -- through the spherical harmonics to means and eye. */
+/* frame/plain_view.c -- adjoint of the spherical harmonics with respect to means and eye. */
 #include "frame/plain_view.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ typedef struct view_job {
     double (*d_eye)[3]; /* per block */
 } view_job;
 
-/* dL/dmean through the colour of Gaussian `i` of those seen. */
+/* dL/dmean through the colour of the i-th visible Gaussian. */
 static void color_backward(const view_job *job, size_t i, double out[3])
 {
     const gaussians *g = job->seen, *d = job->d_seen;

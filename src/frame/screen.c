@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/screen.c -- the reference's test of what touches a picture (Kerbl 2023, eq 5; docs/crosscheck.md has
-   its constants). */
+/* frame/screen.c -- the reference's visibility test by projected splats (Kerbl 2023, eq 5; docs/crosscheck.md
+   has its constants). */
 #include "frame/screen.h"
 
 #include <math.h>
@@ -29,8 +29,8 @@ screen_view screen_of(const gbt_camera *camera, double near)
     return s;
 }
 
-/* One row of J R M, M the Gaussian's axes times its scales: the products of two rows are its covariance on
-   the image. */
+/* One row of J R M, where M is the Gaussian's axes times its scales; products of two rows are the entries of
+   its image covariance. */
 static void project_axis(const screen_view *s, int k, const double t[3], const double axes[9], double row[3])
 {
     const double ratio = fmax(s->low[k], fmin(s->high[k], t[k] / t[2])), scale = s->focal[k] / t[2];
@@ -66,7 +66,7 @@ bool screen_touches(const screen_view *s, const float mean[3], const float quat[
     const double radius = ceil(radius_sigmas * sqrt(largest));
     if (!isfinite(radius))
         return false;
-    for (int k = 0; k < 2; k++) { /* the first tile, and the one after the last */
+    for (int k = 0; k < 2; k++) { /* tiles: the first one touched, and the one after the last */
         const double at = s->focal[k] * t[k] / t[2] + s->principal[k];
         const double first = fmax(floor((at - radius) / TILE), 0),
                      end = fmin(floor((at + radius + TILE - 1) / TILE), s->tiles[k]);

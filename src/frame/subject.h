@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/subject.h -- what a frame shows: the neural Gaussians of anchors, or plain ones. */
+/* frame/subject.h -- what a frame renders: the neural Gaussians of anchors, or plain Gaussians. */
 #ifndef GBT_FRAME_SUBJECT_H
 #define GBT_FRAME_SUBJECT_H
 
 #include "anchor/decode.h"
 #include "data/gaussian_cloud.h"
 
-/** One of the two: anchors with their networks, or a cloud. Borrowed. Its parts, anchors or Gaussians, are
-    what may be visible or not. */
+/** Either anchors with their networks, or a cloud. Borrowed. Visibility is decided for its parts, which are
+    anchors or plain Gaussians. */
 typedef struct frame_subject {
     const anchors *anchors;
     const decoder *decoder;

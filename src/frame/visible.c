@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* frame/visible.c -- bounds on all rays of a view, and what they may reach. */
+/* frame/visible.c -- bounds on all rays of a view, and the parts that the rays may hit. */
 #include "frame/visible.h"
 
 #include <math.h>
@@ -18,10 +18,10 @@ enum {
     PART_BLOCK = 1024,
     ROW_GRAIN = 16,
     LANES = 4,
-    AXIS_STEP = 7 /* one ray of so many gives the mean direction */
+    AXIS_STEP = 7 /* every AXIS_STEP-th ray is used for the mean direction */
 };
 
-/* What is asked of the rays: `axes` turns world to the axes in which slopes are taken. */
+/* Bounds of the rays to compute: `axes` rotates from world axes to those in which slopes are measured. */
 typedef struct bounds_job {
     const ray_image *rays;
     double axes[9], center[3], axis[3];
@@ -43,8 +43,7 @@ static bool ray_at(const ray_image *rays, size_t i, const double center[3], doub
     return d[0] != 0 || d[1] != 0 || d[2] != 0;
 }
 
-/* The smaller or larger of two, and the second when the first is not a number; fmin() would be a call for
-   every ray. */
+/* Minimum and maximum; the second argument when the first is NaN. fmin() would be a function call per ray. */
 static inline double least(double a, double b) { return a < b ? a : b; }
 
 static inline double most(double a, double b) { return a > b ? a : b; }
@@ -52,18 +51,17 @@ static inline double most(double a, double b) { return a > b ? a : b; }
 typedef double lanes4 __attribute__((vector_size(32)));
 typedef int64_t mask4 __attribute__((vector_size(32)));
 
-/* Vectors of 256 bits: every instruction set that has wider ones has these, and GCC takes wider ones apart
-   value by value for those that have not. */
+/* Vectors of 256 bits: GCC splits wider ones into single values on processors that do not have them. */
 #define PICK(mask, yes, no) ((lanes4)(((mask) & (mask4)(yes)) | (~(mask) & (mask4)(no))))
 #define KEEP_LEAST(value, bound) bound = PICK((value) < (bound), value, bound)
 #define KEEP_MOST(value, bound) bound = PICK((value) > (bound), value, bound)
 
-/* Bounds of rays side by side. */
+/* Bounds of rays, in SIMD lanes. */
 typedef struct lane_bounds {
     lanes4 cos_min, depth_min, low[2], high[2];
 } lane_bounds;
 
-/* Of `count` directions, a multiple of LANES; those that are 0 do not matter. */
+/* Bounds of `count` directions, a multiple of LANES; zero directions are ignored. */
 FASTEST_CLONE static void bound_lanes(const float *dir, size_t count, const double axes[9],
                                       const double axis[3], lane_bounds *bounds)
 {
@@ -186,14 +184,15 @@ static void find_axis(bounds_job *job, size_t rows, size_t block_count)
     dvec_normalize(job->axis);
 }
 
-/* Axes in which to take slopes: the camera's, or for given rays some with z along their mean direction. */
+/* Axes in which slopes are measured: the camera's, or, for given rays, axes with z along their mean
+   direction. */
 static void find_axes(const ray_shot *shot, const double axis[3], double axes[9])
 {
     gbt_camera look = shot->camera;
     const double here[3] = {0, 0, 0}, up[3] = {fabs(axis[0]) < 0.6, fabs(axis[0]) >= 0.6, 0};
     if (shot->given != NULL)
-        gbt_camera_look_at(here, axis, up, &look); /* fails for a zero axis: then no ray looks forward in any
-                                                      axes */
+        gbt_camera_look_at(here, axis, up, &look); /* fails for a zero axis; then the rays do not all look
+                                                      forward in any axes */
     memcpy(axes, look.rotation, sizeof look.rotation);
 }
 
@@ -218,7 +217,7 @@ static void find_center(const ray_image *rays, float center[3])
         center[k] = used > 0 ? (float)(sum[k] / (double)used) : 0;
 }
 
-/* Unit normals in world axes: right, left, bottom, top of the slopes, and what is behind. */
+/* Unit normals of the planes in world axes: right, left, bottom and top slopes, and the plane behind. */
 static void find_normals(bounds_job *job, const block_bounds *all, double spread)
 {
     for (int k = 0; k < 2; k++)
@@ -235,8 +234,8 @@ static void find_normals(bounds_job *job, const block_bounds *all, double spread
         job->normal[4][k] = -job->axis[k];
 }
 
-/* Is the image of a slope under another point of the aperture known? With a plane in focus every ray of a
-   pixel is divided by the same depth, in the axes of the pose that took it. */
+/* Can slopes be bounded for other points of the aperture? With a plane in focus, all rays of a pixel meet at
+   the same depth, in the axes of the pose that exposed it. */
 static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double aperture)
 {
     return aperture <= 0 || (camera_is_still(&shot->camera) && camera_lens_looks_forward(&rays->lens));
@@ -244,7 +243,7 @@ static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double
 
 /* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its
    radius R, and with the focus at F a slope by at most R / F and a direction by at most asin(R / F). With
-   ray_shot.one_start the camera starts them at most half of its way from where they do. */
+   ray_shot.one_start the moving camera's true origins are at most half of its path away. */
 gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
 {
     bounds_job job = {.rays = rays};
@@ -269,7 +268,7 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     const double widest = fmin(1, fmax(-1, all.cos_min)), sine = sqrt(1 - widest * widest);
     const double cos_spread = sqrt(fmax(0, 1 - spread * spread));
     const bool all_around =
-        spread >= 1 || sine * cos_spread + widest * spread < 0; /* angles beyond 180 degrees */
+        spread >= 1 || sine * cos_spread + widest * spread < 0; /* the cone exceeds 180 degrees */
     const double cos_wide = all_around ? -1 : widest * cos_spread - sine * spread,
                  cos_min = fmax(cos_wide - 2e-3, -1);
     out->cos_angle = (float)cos_min;
@@ -295,7 +294,8 @@ gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bo
     return GBT_OK;
 }
 
-/* The Gaussians of one part: no mean is farther from the centre, no std-dev larger. */
+/* Bounds of the Gaussians of one part: the largest distance of a mean from the centre, and the largest
+   std-dev. */
 typedef struct part_ball {
     const float *center;
     float farthest, scale;
@@ -322,7 +322,7 @@ static part_ball plain_ball(const gaussian_cloud *cloud, size_t i)
     return (part_ball){cloud->mean + 3 * i, 0, expf(fmaxf(l[0], fmaxf(l[1], l[2])))};
 }
 
-/* Radius of a ball around the part that holds the proxies of all its Gaussians. */
+/* Radius of a ball around the part that encloses the proxies of all its Gaussians. */
 static float reach_of(const part_ball *part, const visible_reach *reach, float pixel_min, const float eye[3])
 {
     if (reach->width <= 0)
@@ -339,23 +339,23 @@ static bool is_visible(const view_bounds *b, const float position[3], float reac
     const float d[3] = {position[0] - b->center[0], position[1] - b->center[1], position[2] - b->center[2]};
     for (int i = 0; i < b->plane_count; i++)
         if (!(b->plane[i][0] * d[0] + b->plane[i][1] * d[1] + b->plane[i][2] * d[2] <= b->offset[i] + reach))
-            return false; /* and a place that is not a number */
+            return false; /* also for NaN */
     if (b->plane_count > 0)
         return true;
-    /* A ray from elsewhere reaches the ball only if one from the centre reaches a ball that is larger by its
-       distance. */
+    /* A ray whose origin is a distance r from the centre can hit the ball only if a ray from the centre hits
+       the ball enlarged by r. */
     reach += b->origin_radius;
     const float square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     if (square <= reach * reach)
         return true;
-    /* Cone of half angle A, ball seen under half angle B: they meet when the angle between axis and centre is
-       at most A + B. */
+    /* Cone of half angle A, ball with angular radius B: they intersect when the angle between the axis and
+       the ball's centre is at most A + B. */
     const float length = sqrtf(square),
                 along = (b->axis[0] * d[0] + b->axis[1] * d[1] + b->axis[2] * d[2]) / length;
     const float sin_ball = reach / length, cos_ball = sqrtf(1 - sin_ball * sin_ball);
     const float cos_sum = b->cos_angle * cos_ball - b->sin_angle * sin_ball;
     return b->sin_angle * cos_ball + b->cos_angle * sin_ball < 0 ||
-           along >= cos_sum; /* A + B beyond 180 degrees sees everything */
+           along >= cos_sum; /* with A + B beyond 180 degrees everything is visible */
 }
 
 typedef struct visible_job {
@@ -364,11 +364,11 @@ typedef struct visible_job {
     const visible_reach *reach;
     const screen_view *screen;
     const visible_chance *chance;
-    uint32_t *out;       /* [count]; block b writes from its own begin */
+    uint32_t *out;       /* [count]; block b writes from its own first element on */
     uint32_t *out_count; /* per block */
 } visible_job;
 
-/* An anchor's own ellipsoid is as wide as its offsets are long, and does not turn. */
+/* The reference's ellipsoid of an anchor: std-devs are the offset scales, axes are not rotated. */
 static bool is_on_screen(const screen_view *s, const anchors *a, size_t i)
 {
     static const float straight[4] = {1, 0, 0, 0};
@@ -381,7 +381,7 @@ static bool may_be_met(const visible_job *job, size_t i)
     const anchors *a = job->subject.anchors;
     if (job->screen != NULL)
         return is_on_screen(job->screen, a, i);
-    /* An anchor in view is visible however far it reaches: most need no more. */
+    /* Quick test: an anchor inside the planes is visible whatever its reach; this decides most anchors. */
     if (job->subject.cloud == NULL && job->bounds->plane_count > 0 &&
         is_visible(job->bounds, a->position + 3 * i, 0))
         return true;

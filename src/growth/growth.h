@@ -19,8 +19,8 @@ typedef struct growth_points {
     const uint32_t *anchor; /* [count]: row of the nearest anchor, whose Gaussians' gradients decide about the
                                point */
     bool as_start;          /* true: the threshold of the first level, Gaussians count regardless of how many
-                               views saw them, and new anchors have the size `scale`; false: threshold and size
-                               of the last level, and only Gaussians that enough views saw count */
+                               views saw them, and new anchors have the size `scale`; false: threshold and
+                               size of the last level, and only Gaussians that enough views saw count */
     const float *scale;     /* [count] > 0, if as_start: initial scale of an anchor there */
 } growth_points;
 

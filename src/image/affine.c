@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/affine.c -- colour matrices: apply, adjoint, what cameras cut, least squares. */
+/* image/affine.c -- colour matrices: apply, adjoint, clipping of the camera, least-squares fit. */
 #include "image/affine.h"
 
 #include <math.h>
@@ -28,7 +28,7 @@ typedef struct affine_job {
 
 static size_t pixel_count(const image *im) { return (size_t)im->width * (size_t)im->height; }
 
-/* At most BLOCKS_MAX blocks, by the size alone. */
+/* At most BLOCKS_MAX blocks; the grain depends only on the image size. */
 static size_t block_grain(size_t pixels)
 {
     const size_t even = (pixels + BLOCKS_MAX - 1) / BLOCKS_MAX;
@@ -83,11 +83,11 @@ void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, d
             d_m[k] += job.sums[b][k];
 }
 
-/* ---- the ends of a camera's range ---- */
+/* ---- clipping at the ends of a camera's range ---- */
 
 typedef struct cut_job {
-    const image *photo, *seen; /* seen: shown, as it is read */
-    image *out;                /* shown itself, or its gradient */
+    const image *photo, *seen; /* seen: `shown` as input */
+    image *out;                /* output: `shown` itself, or its gradient */
 } cut_job;
 
 static bool is_beyond(float photo, float shown)
@@ -157,7 +157,7 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
         if (i < OUTPUTS)
             b[i][i] += weight;
     }
-    symmetric_cholesky(a, a, INPUTS, 1e-300); /* positive definite */
+    symmetric_cholesky(a, a, INPUTS, 1e-300); /* the matrix is positive definite */
     for (int r = 0; r < OUTPUTS; r++) {
         symmetric_solve(a, b[r], INPUTS);
         for (int i = 0; i < INPUTS; i++)
@@ -167,7 +167,7 @@ void affine_fit(const image *from, const image *to, const unsigned char *valid, 
 
 /* ---- left and right ---- */
 
-/* The last `kept` bytes of each of `rows` rows. */
+/* Copy the last `kept` bytes of each of `rows` rows. */
 static void copy_right(const void *in, size_t row, size_t kept, int rows, void *out)
 {
     for (size_t y = 0; y < (size_t)rows; y++)

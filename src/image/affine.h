@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/affine.h -- colours through a 3 x 4 matrix: a photo's exposure and white balance, learned, or fitted
-   to a part of it. */
+/* image/affine.h -- 3 x 4 colour matrices that model the exposure and white balance of a photo: apply,
+   differentiate, fit by least squares. */
 #ifndef GBT_IMAGE_AFFINE_H
 #define GBT_IMAGE_AFFINE_H
 
@@ -11,14 +11,14 @@ enum { AFFINE_NUMBERS = 12 };
 
 void affine_identity(float m[AFFINE_NUMBERS]);
 
-/** out = m(in), nothing clamped. Both 3 channels and of one size; `out` may be `in`. Threads: parallel
+/** out = m(in), without clamping. Both have 3 channels and equal size; `out` may be `in`. Threads: parallel
     inside. */
 void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out);
 
 /**
  * Adjoint of affine_apply().
  *
- * @param in  [in]     what affine_apply() was given
+ * @param in  [in]     the input of affine_apply()
  * @param d   [in,out] dL/dout; becomes dL/din
  * @param d_m [out]    dL/dm, summed in double
  * Threads: parallel inside; the same bits for every thread count.
@@ -26,30 +26,29 @@ void affine_apply(const float m[AFFINE_NUMBERS], const image *in, image *out);
 void affine_backward(const float m[AFFINE_NUMBERS], const image *in, image *d, double d_m[AFFINE_NUMBERS]);
 
 /**
- * What a camera does to light beyond its range: where a channel of `photo` is white (>= 0.99) or black (<=
- * 0.01) and that of `shown` lies beyond it, `shown` becomes the photo, so that the difference asks nothing of
- * it.
+ * Model the camera's clipping: where a channel of `photo` is white (>= 0.99) or black (<= 0.01) and `shown`
+ * is beyond it, `shown` is set to the photo's value, so that the pixel contributes no loss.
  *
- * @param shown [in,out] a picture through the photo's matrix, 3 channels, the size of `photo`
+ * @param shown [in,out] a render after the photo's matrix, 3 channels, the size of `photo`
  * Threads: parallel inside.
  */
 void affine_cut(const image *photo, image *shown);
 
-/** Adjoint of affine_cut(): d (dL/d shown) is 0 where it has cut `shown`. Threads: parallel inside. */
+/** Adjoint of affine_cut(): d (dL/d shown) becomes 0 where `shown` was clipped. Threads: parallel inside. */
 void affine_cut_backward(const image *photo, const image *shown, image *d);
 
 /**
- * The matrix that brings the columns [begin, end) of `from` nearest to those of `to`, by least squares, over
- * the pixels where `valid` (NULL: all).
+ * The least-squares matrix from the columns [begin, end) of `from` to those of `to`, over the pixels where
+ * `valid` is not 0 (NULL: all).
  *
- * Minimises mean |m(from) - to|^2 + 1e-6 |m - identity|^2, so that colours which tell nothing (a black or
- * one-coloured picture, no columns) leave the matrix as near to the identity as they allow. Values that are
- * not finite count as 0.
+ * Minimises mean |m(from) - to|^2 + 1e-6 |m - identity|^2, so that where the colours do not determine the
+ * matrix (a black or single-coloured image, no columns) it stays as near to the identity as possible.
+ * Non-finite values are treated as 0.
  */
 void affine_fit(const image *from, const image *to, const unsigned char *valid, int begin, int end,
                 float m[AFFINE_NUMBERS]);
 
-/** The right halves of a render and its photo, and which of their pixels count. Free with
+/** The right halves of a render and its photo, and the mask of their valid pixels. Free with
     affine_half_free(). */
 typedef struct affine_half {
     image render, photo;
@@ -57,14 +56,14 @@ typedef struct affine_half {
 } affine_half;
 
 /**
- * How a picture is scored when every photo may have an exposure of its own: fit on its left half, score its
+ * Prepare the scoring of photos with individual exposures: fit the colour matrix on the left half, score the
  * right half.
  *
- * The left half are columns [0, width / 2), the right half the rest.
+ * The left half is columns [0, width / 2), the right half the rest.
  *
- * @param render       [in,out] 3 channels, not clamped; replaced by m(render), whole
+ * @param render       [in,out] 3 channels, not clamped; completely replaced by m(render)
  * @param photo        [in]     the size of render
- * @param valid        [in]     NULL (all) or [height][width]: 0 for pixels that are not fitted
+ * @param valid        [in]     NULL (all) or [height][width]: 0 for pixels that are excluded from the fit
  * @param out          [out]    free with affine_half_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
  */

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/flip.c -- LDR-FLIP: how visible the difference of two images is when one flips between them
-   (Andersson 2020).
+/* image/flip.c -- LDR-FLIP: perceptual difference of two images that are shown alternately (Andersson 2020).
 
    sRGB --> YCxCz --+--> [contrast sensitivity filters] --> L*a*b*, Hunt --> HyAB --> colour difference c
                     +--> [edge and point detectors on Y] -------------------------> feature difference f
                                                      c, f in [0, 1]                 error = c^(1 - f)
 
-   Every 2-D filter of the paper is a sum of products of 1-D filters, so each is a column pass and a row pass.
-   Borders repeat. */
+   Every 2-D filter of the paper is a sum of products of 1-D filters, so each is computed as a column pass and
+   a row pass. Borders are replicated. */
 #include "image/metrics.h"
 
 #include <math.h>
@@ -50,7 +49,7 @@ typedef struct flip_filters {
     filter gauss, edge, point;
     double white[3];
     double xyz_to_rgb[3][3];
-    double color_max; /* the largest HyAB distance of two colours, to the power qc */
+    double color_max; /* the largest possible HyAB distance of two colours, to the power qc */
 } flip_filters;
 
 typedef struct flip_job {
@@ -94,7 +93,7 @@ static double lab_curve(double t)
     return t > delta * delta * delta ? pow(t, 1.0 / 3) : t / (3 * delta * delta) + 4.0 / 29;
 }
 
-/* Linear RGB to L*a*b*; then the Hunt effect: colours look less colourful in the dark. */
+/* Linear RGB to L*a*b*, then the Hunt adjustment: chroma is reduced at low luminance. */
 static void hunt_lab(const flip_filters *f, const double rgb[3], double lab[3])
 {
     double xyz[3];
@@ -113,14 +112,14 @@ static double color_distance(const double a[3], const double b[3])
     return pow(fabs(a[0] - b[0]) + sqrt(da * da + db * db), 0.7);
 }
 
-/* Stretch [0, 0.4 max] to [0, 0.95], since small differences are what matters, and the rest to [0.95, 1]. */
+/* Map [0, 0.4 max] to [0, 0.95], because small differences matter most, and the rest to [0.95, 1]. */
 static double redistribute(const flip_filters *f, double distance)
 {
     const double pc = 0.4, pt = 0.95, knee = pc * f->color_max;
     return distance < knee ? pt / knee * distance : pt + (distance - knee) / (f->color_max - knee) * (1 - pt);
 }
 
-/* exp(-pi^2 x^2 / b) at x degrees, summing to 1; returns the sum before that. */
+/* Filter exp(-pi^2 x^2 / b) at x degrees, normalised to sum 1; returns the sum before normalisation. */
 static double make_csf(filter *out, double b)
 {
     const double widest = 0.04;
@@ -135,7 +134,7 @@ static double make_csf(filter *out, double b)
     return sum;
 }
 
-/* Positive taps sum to 1, negative taps to -1. */
+/* Normalise so that positive taps sum to 1 and negative taps to -1. */
 static void normalize_signed(filter *f)
 {
     double positive = 0, negative = 0;
@@ -155,7 +154,7 @@ static void make_filters(flip_filters *f)
     const double amplitude[2] = {34.1, 13.5}, b[2] = {0.04, 0.025};
     for (int i = 0; i < 2; i++) {
         const double sum = make_csf(&f->blue_yellow[i], b[i]);
-        f->blue_yellow_weight[i] = amplitude[i] * sqrt(PI / b[i]) * sum * sum; /* of the 2-D filter */
+        f->blue_yellow_weight[i] = amplitude[i] * sqrt(PI / b[i]) * sum * sum; /* weight of the 2-D filter */
     }
     const double total = f->blue_yellow_weight[0] + f->blue_yellow_weight[1];
     f->blue_yellow_weight[0] /= total;
@@ -205,7 +204,7 @@ static void opponent_rows(size_t block, size_t begin, size_t end, void *context)
         }
 }
 
-/* Column pass into a row that has RADIUS_MAX values of margin on both sides, filled by repeating its ends. */
+/* Column pass into a row with a margin of RADIUS_MAX values on both sides, filled by replicating its ends. */
 FASTEST_CLONE static void filter_columns(const flip_job *job, const float *plane, size_t row, const filter *f,
                                          double *restrict out)
 {
@@ -223,7 +222,7 @@ FASTEST_CLONE static void filter_columns(const flip_job *job, const float *plane
     }
 }
 
-/* Row pass over what filter_columns() left. */
+/* Row pass over the output of filter_columns(). */
 FASTEST_CLONE static void filter_row(const double *restrict in, const filter *f, size_t width,
                                      double *restrict out)
 {
@@ -235,7 +234,7 @@ FASTEST_CLONE static void filter_row(const double *restrict in, const filter *f,
     }
 }
 
-/* One row of a plane by the product of two 1-D filters. `column` is for its column pass. */
+/* Filter one row of a plane by the product of two 1-D filters. `column` is scratch for the column pass. */
 static void filter_plane(const flip_job *job, const float *plane, size_t row, const filter *down,
                          const filter *across, double *column, double *out)
 {
@@ -243,7 +242,7 @@ static void filter_plane(const flip_job *job, const float *plane, size_t row, co
     filter_row(column, across, job->width, out);
 }
 
-/* What is seen of one row of one image. */
+/* Perceived colour (L*a*b*) and feature strengths of one row of one image. */
 static void appearance(const flip_job *job, int source, size_t row, double *column,
                        double *const filtered[FILTERED], double *const out[SEEN])
 {
@@ -273,7 +272,8 @@ static void appearance(const flip_job *job, int source, size_t row, double *colu
         out[0][i] = lab[0];
         out[1][i] = lab[1];
         out[2][i] = lab[2];
-        /* The detectors work on Y scaled to [0, 1]; their taps sum to 0, so only the factor matters. */
+        /* The paper's detectors use Y scaled to [0, 1]. Their taps sum to 0, so only the scale factor matters
+           here. */
         out[3][i] = dvec_length2(filtered[4][i], filtered[5][i]) / 116;
         out[4][i] = dvec_length2(filtered[6][i], filtered[7][i]) / 116;
     }

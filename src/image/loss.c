@@ -8,9 +8,9 @@
    With p the partial of the map by mu_x (total), q by var_x, r by cov, and G the window:
    dSSIM/dx = G*p + 2 x G*q + y G*r.
 
-   The picture is cut into tiles, which do not depend on the number of threads. A tile makes the map of
-   WINDOW_RADIUS pixels more than it owns on all sides, from moments of as many more, so that no tile waits
-   for another. */
+   The image is divided into tiles that do not depend on the number of threads. A tile computes the SSIM map
+   for WINDOW_RADIUS more pixels than it owns on all sides, from moments of another WINDOW_RADIUS more, so
+   that tiles are independent of each other. */
 #include "image/metrics.h"
 
 #include <math.h>
@@ -28,27 +28,29 @@
 enum {
     CHANNELS = LOSS_CHANNELS,
     RADIUS = WINDOW_RADIUS,
-    SEGMENT_MAX = 32, /* pixels; the rows of both rings then fit the second-level cache */
-    TILE_WIDTH = LOSS_LANES * SEGMENT_MAX,   /* pixels */
-    TILE_OWNED = TILE_WIDTH - 2 * RADIUS,    /* of them, those whose gradient it makes */
-    BAND_ROWS = 128,                         /* at most, owned by a tile */
-    BAND_LEAST = 40,                         /* with fewer a tile makes more rows around its own than those */
-    TILES_WANTED = 4,                        /* of a small picture */
-    ROW_MAX = TILE_WIDTH * CHANNELS,         /* values */
-    ROW_STRIDE = ROW_MAX + LOSS_STEP,        /* not a multiple of a page: rows fall on different lines */
-    WIDE_STRIDE = ROW_MAX + 2 * LOSS_MARGIN, /* a row with both margins */
-    RING = 16,                               /* rows: LOSS_SPAN, in whole groups */
-    AHEAD = (RING - LOSS_GROUP) / LOSS_GROUP, /* groups by which a pass is ahead of the next */
+    SEGMENT_MAX = 32, /* pixels; both ring buffers of rows then fit the second-level cache */
+    TILE_WIDTH = LOSS_LANES * SEGMENT_MAX,    /* pixels */
+    TILE_OWNED = TILE_WIDTH - 2 * RADIUS,     /* pixels whose gradient the tile computes */
+    BAND_ROWS = 128,                          /* maximum number owned by a tile */
+    BAND_LEAST = 40,                          /* with fewer, a tile would compute more halo rows than own
+                                                 rows */
+    TILES_WANTED = 4,                         /* for a small image */
+    ROW_MAX = TILE_WIDTH * CHANNELS,          /* values */
+    ROW_STRIDE = ROW_MAX + LOSS_STEP,         /* not a multiple of the page size, so that rows use different
+                                                 cache sets */
+    WIDE_STRIDE = ROW_MAX + 2 * LOSS_MARGIN,  /* a row with both margins */
+    RING = 16,                                /* rows: LOSS_SPAN rounded up to whole groups */
+    AHEAD = (RING - LOSS_GROUP) / LOSS_GROUP, /* number of groups that a pass runs ahead of the next one */
     COUNT_BLOCK = 1 << 16,                    /* pixels */
     SUMS = 3
 };
 
-/* Where a tile keeps the rows it is at. */
+/* Row buffers of the tile that a thread works on. */
 typedef struct loss_room {
     atomic_flag taken;
     double moments[LOSS_MOMENTS][RING][ROW_STRIDE], partials[LOSS_PARTIALS][RING][ROW_STRIDE];
     double wide[LOSS_GROUP * LOSS_PARTIALS][WIDE_STRIDE];
-    double sums[SUMS][ROW_STRIDE]; /* of map, |x - y| and (x - y)^2, one for each place in a row */
+    double sums[SUMS][ROW_STRIDE]; /* of the SSIM map, |x - y| and (x - y)^2, one per position in a row */
     double inside[ROW_STRIDE], nothing[ROW_STRIDE], counted[LOSS_GROUP][ROW_STRIDE];
     float x[LOSS_GROUP][ROW_STRIDE], y[LOSS_GROUP][ROW_STRIDE], d_x[LOSS_GROUP][ROW_STRIDE];
     float pixels_x[ROW_MAX + 2 * LOSS_STEP], pixels_y[ROW_MAX + 2 * LOSS_STEP];
@@ -69,11 +71,11 @@ typedef struct loss_job {
 typedef struct loss_tile {
     const loss_job *job;
     loss_room *room;
-    ptrdiff_t first;      /* column of its first pixel; may lie left of the picture */
-    size_t segment;       /* pixels of a lane */
+    ptrdiff_t first;      /* column of its first pixel; may be left of the image */
+    size_t segment;       /* pixels per lane */
     size_t count;         /* values in a row */
-    size_t begin, end;    /* rows it owns */
-    size_t owned, column; /* columns it owns, from `column` on */
+    size_t begin, end;    /* rows that it owns */
+    size_t owned, column; /* number of columns that it owns, from `column` on */
 } loss_tile;
 
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
@@ -81,7 +83,7 @@ static size_t round_up(size_t count, size_t multiple) { return (count + multiple
 static loss_tile tile_at(const loss_job *job, loss_room *room, size_t index)
 {
     loss_tile t = {.job = job, .room = room};
-    const size_t place = index % job->across; /* tiles of one row are about as wide as each other */
+    const size_t place = index % job->across; /* tiles of one row have nearly equal widths */
     t.column = place * job->width / job->across;
     t.owned = (place + 1) * job->width / job->across - t.column;
     t.first = (ptrdiff_t)t.column - RADIUS;
@@ -98,7 +100,7 @@ static bool is_row(const loss_tile *t, ptrdiff_t row) { return row >= 0 && row <
 
 /* ---- rows of pixels ---- */
 
-/* Pixels [first, first + count) of a row, 0 where there is none or it is not valid. */
+/* Copy pixels [first, first + count) of a row; 0 for pixels outside the image and invalid ones. */
 static void copy_pixels(const loss_job *job, const float *picture, size_t row, ptrdiff_t first, size_t count,
                         float *out)
 {
@@ -116,7 +118,7 @@ static void copy_pixels(const loss_job *job, const float *picture, size_t row, p
             memset(out + (i - first) * CHANNELS, 0, CHANNELS * sizeof *out);
 }
 
-/* Asks for the pixels of a row that will be wanted soon: a tile's rows lie far apart in memory. */
+/* Prefetch the pixels of a row that is needed soon: the rows of a tile are far apart in memory. */
 static void fetch_pixels(const loss_tile *t, const float *picture, ptrdiff_t row)
 {
     enum { LINE = 16 /* floats */ };
@@ -129,7 +131,7 @@ static void fetch_pixels(const loss_tile *t, const float *picture, ptrdiff_t row
 
 /* ---- the passes ---- */
 
-/* A row of the moments, into its place of their ring. */
+/* Compute one row of the moments and store it in their ring buffer. */
 static void moment_row(const loss_tile *t, ptrdiff_t row, size_t place)
 {
     loss_room *room = t->room;
@@ -161,7 +163,7 @@ static void moment_row(const loss_tile *t, ptrdiff_t row, size_t place)
         kernels->row_pass(products[m], t->count, room->moments[m][place]);
 }
 
-/* Where the map of a row counts. */
+/* Mask of the pixels of a row at which the SSIM map counts. */
 static const double *counts_of(const loss_tile *t, ptrdiff_t row, double *out)
 {
     const loss_job *job = t->job;
@@ -180,7 +182,7 @@ static const double *counts_of(const loss_tile *t, ptrdiff_t row, double *out)
     return out;
 }
 
-/* A group of rows of the partials, into their places of the ring. */
+/* Compute a group of rows of the partials and store them in the ring buffer. */
 static void map_rows(const loss_tile *t, ptrdiff_t first_row, size_t first_place)
 {
     loss_room *room = t->room;
@@ -206,7 +208,7 @@ static void map_rows(const loss_tile *t, ptrdiff_t first_row, size_t first_place
             t->job->kernels->row_pass(partials[k][m], t->count, room->partials[m][(first_place + k) % RING]);
 }
 
-/* A group of rows of the gradient, into the picture. */
+/* Compute a group of rows of the gradient and store them in d_x. */
 static void gradient_rows(const loss_tile *t, size_t first_row, size_t first_place)
 {
     const loss_job *job = t->job;
@@ -242,7 +244,7 @@ static void gradient_rows(const loss_tile *t, size_t first_row, size_t first_pla
     }
 }
 
-/* Sets 0 in a row in lanes at all pixels but [begin, end) of the tile. */
+/* Set a row in lane layout to 0 at all pixels but [begin, end) of the tile. */
 static void keep_pixels(const loss_tile *t, size_t begin, size_t end, double *row)
 {
     for (size_t i = 0; i < LOSS_LANES * t->segment; i++) {
@@ -264,8 +266,8 @@ static void run_tile(const loss_job *job, loss_room *room, size_t index)
     memset(room->x, 0, sizeof room->x);
     memset(room->y, 0, sizeof room->y);
 
-    /* Groups of rows go in at the bottom: moments 2 RADIUS above the first row of the gradient, partials
-       RADIUS above it. */
+    /* Rows are processed in groups from top to bottom. Moments start 2 RADIUS rows above the first row of the
+       gradient, partials RADIUS rows above it. */
     const size_t groups = round_up(t.end - t.begin, LOSS_GROUP) / LOSS_GROUP;
     for (size_t step = 0; step < groups + 2 * AHEAD; step++) {
         const size_t place = step * LOSS_GROUP;
@@ -283,7 +285,7 @@ static void run_tile(const loss_job *job, loss_room *room, size_t index)
     }
 }
 
-/* There are as many rooms as threads. */
+/* Take a free buffer; there are as many as threads. */
 static size_t take_room(const loss_job *job)
 {
     for (size_t i = 0;; i = (i + 1) % job->room_count)
@@ -301,7 +303,7 @@ static void run_one_tile(size_t tile, size_t begin, size_t end, void *context)
     atomic_flag_clear(&job->rooms[room].taken);
 }
 
-/* Rows of tiles: more of a small picture, or it would be one tile. */
+/* Number of rows of tiles: more for a small image, which would otherwise be a single tile. */
 static size_t band_count(size_t height, size_t across)
 {
     size_t bands = parallel_block_count(height, BAND_ROWS);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* image/loss_rows.c -- the inner loops of the training loss.
 
-   The bodies are plain loops that GCC turns into vectors of whatever width the calling function is compiled
-   for. `ivdep` says what the interface says, that outputs are apart from inputs: GCC gives up on run-time
+   The bodies are plain loops, which GCC vectorises with the width of the function they are inlined into.
+   `ivdep` states what the interface requires, that outputs do not overlap inputs: GCC gives up on run-time
    checks between this many arrays. */
 #include "image/loss_rows.h"
 
@@ -13,13 +13,13 @@
 
 #define BODY static inline __attribute__((always_inline))
 
-/* Values of a row at a time where a column pass is followed by arithmetic on its results: they stay in the
-   first-level cache. */
+/* Number of values of a row processed at a time when arithmetic follows a column pass, so that they stay in
+   the first-level cache. */
 enum { PART = LOSS_GROUP * LOSS_STEP };
 
 static const double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
 
-/* The window over eleven values, the outermost pair last. */
+/* The Gaussian window over eleven values, summed from the centre outwards. */
 #define WINDOW(a, b, c, d, e, f, g, h, i, j, k)                                                              \
     __builtin_fma(WINDOW_TAP5, (a) + (k),                                                                    \
                   __builtin_fma(WINDOW_TAP4, (b) + (j),                                                      \
@@ -28,7 +28,7 @@ static const double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
                                                             __builtin_fma(WINDOW_TAP1, (e) + (g),            \
                                                                           WINDOW_TAP0 * (f))))))
 
-/* Results at LOSS_GROUP neighbouring places from LOSS_SPAN values. */
+/* Window results at LOSS_GROUP neighbouring positions from LOSS_SPAN values. */
 #define WINDOW_GROUP(v, out0, out1, out2, out3)                                                              \
     do {                                                                                                     \
         const double v0 = v(0), v1 = v(1), v2 = v(2), v3 = v(3), v4 = v(4), v5 = v(5), v6 = v(6);            \
@@ -52,7 +52,7 @@ BODY void row_pass_body(const double *restrict in, size_t count, double *restric
     }
 }
 
-/* PART values of LOSS_GROUP rows from `begin` on. */
+/* Column pass for PART values of LOSS_GROUP rows from `begin` on. */
 BODY void column_pass(const double *const rows[LOSS_SPAN], size_t begin, double out[LOSS_GROUP][PART])
 {
     const double *r[LOSS_SPAN];
@@ -81,8 +81,8 @@ BODY void products_body(const float *restrict x, const float *restrict y, size_t
     }
 }
 
-/* x = y makes squares twice the product to the last bit, so numerator and denominator are the same number and
-   the similarity is exactly 1: the correction of the quotient sees to that. */
+/* For x = y the sum of squares is exactly twice the product, so numerator and denominator are the same
+   number, and the correction step of the quotient makes the similarity exactly 1. */
 BODY void map_body(const double *const moments[LOSS_MOMENTS][LOSS_SPAN],
                    const double *const counts[LOSS_GROUP], const double weight[LOSS_GROUP], size_t count,
                    double *const partials[LOSS_GROUP][LOSS_PARTIALS], double *restrict sum)
@@ -152,7 +152,7 @@ BODY void gradient_body(const double *const partials[LOSS_PARTIALS][LOSS_SPAN],
 
 typedef double place8 __attribute__((vector_size(64)));
 
-/* One margin: what stands in the neighbouring lane, and in the outermost one, `edge`, what is given. */
+/* Fill one margin from the neighbouring lane; the outermost lane, `edge`, gets the given values. */
 BODY void margin(const double *from, int edge, const double *values, double *restrict out)
 {
     for (int i = 0; i < LOSS_MARGIN / LOSS_LANES; i++) {
@@ -178,8 +178,8 @@ typedef float vec8 __attribute__((vector_size(32)));
 #define LOW4(a, b) __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11)
 #define HIGH4(a, b) __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15)
 
-/* Eight rows of eight, turned: pairs of 1, 2 and 4 values change places, which no instruction set does across
-   halves of 128 bits but in the last step. */
+/* Transpose 8 x 8 values by exchanging blocks of 1, 2 and 4 values; only the last step crosses 128-bit
+   halves, which is expensive. */
 BODY void turn8(const float *in, size_t in_row, float *out, size_t out_row)
 {
     vec8 x[8], y[8];
@@ -208,7 +208,7 @@ BODY void turn8(const float *in, size_t in_row, float *out, size_t out_row)
         memcpy(out + (size_t)i * out_row, &y[i], sizeof y[i]);
 }
 
-/* The last eight of a segment may overlap those before. */
+/* The last group of eight of a segment may overlap the previous one. */
 BODY void to_lanes_body(const float *pixels, size_t count, float *lanes)
 {
     const size_t segment = count / LOSS_LANES;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/loss_rows.h -- the inner loops of the training loss, over rows of a tile laid out in lanes, for each
+/* image/loss_rows.h -- the inner loops of the training loss, over rows of a tile in lane layout, for each
    instruction set.
 
-   A tile is LOSS_LANES segments of L pixels side by side, and a row of it has the segments' values as lanes:
-   channel c of pixel lane L + j is at (3 j + c) LOSS_LANES + lane. A pixel's neighbours in its row are then
-   LOSS_STEP values away and in its own lane, so the row pass reads whole vectors, like the column pass. Both
-   make LOSS_GROUP results from LOSS_SPAN values, so that a value is loaded 3.5 times for 11 taps.
+   A tile is LOSS_LANES segments of L pixels side by side, and each segment is one SIMD lane of a row: channel
+   c of pixel lane * L + j is at index (3 j + c) LOSS_LANES + lane. The neighbours of a pixel in its row are
+   then LOSS_STEP values away in the same lane, so the row pass reads whole vectors like the column pass. Both
+   compute LOSS_GROUP results from LOSS_SPAN values, so a value is loaded 3.5 times for 11 taps.
 
-   Everything is in double: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by 1e-4 of the gradient in
-   even parts of a photo. Every variant does the same operations on each value in the same order, so all give
-   the same bits. */
+   All arithmetic is in double: in float32, cancellation in E[x^2] - mu^2 compared with C2 = 9e-4 causes
+   errors of 1e-4 of the gradient in uniform parts of a photo. Every variant does the same operations on each
+   value in the same order, so all give the same bits. */
 #ifndef GBT_IMAGE_LOSS_ROWS_H
 #define GBT_IMAGE_LOSS_ROWS_H
 
@@ -20,8 +20,8 @@
 enum {
     LOSS_CHANNELS = 3,
     LOSS_LANES = 8,
-    LOSS_STEP = LOSS_CHANNELS * LOSS_LANES, /* values from a pixel to the next of its row */
-    LOSS_GROUP = 4,                         /* rows, or pixels, whose results are made at once */
+    LOSS_STEP = LOSS_CHANNELS * LOSS_LANES, /* values from a pixel to the next one in its row */
+    LOSS_GROUP = 4,                         /* rows, or pixels, whose results are computed together */
     LOSS_SPAN = LOSS_GROUP + 2 * WINDOW_RADIUS,
     LOSS_MARGIN = WINDOW_RADIUS * LOSS_STEP,   /* values that a row pass reads beyond both ends of a row */
     LOSS_EDGE = WINDOW_RADIUS * LOSS_CHANNELS, /* values of the pixels beyond one end of a row */
@@ -29,10 +29,10 @@ enum {
     LOSS_PARTIALS = 3                          /* of the map by mu_x (total), var_x, cov */
 };
 
-/* In all of these `count` is the values of a row of the tile, LOSS_STEP L, with L a multiple of LOSS_GROUP
-   and at least LOSS_LANES. */
+/* In all functions `count` is the number of values in a row of the tile, LOSS_STEP L, with L a multiple of
+   LOSS_GROUP and at least LOSS_LANES. */
 typedef struct loss_kernels {
-    /** Pixels in their order, [count], to lanes; and back. */
+    /** Convert pixels in image order, [count], to lane layout, and back. */
     void (*to_lanes)(const float *pixels, size_t count, float *lanes);
     void (*from_lanes)(const float *lanes, size_t count, float *pixels);
 
@@ -42,17 +42,17 @@ typedef struct loss_kernels {
     /** Row pass; `in` is readable for LOSS_MARGIN values before and after. */
     void (*row_pass)(const double *in, size_t count, double *out);
 
-    /** Fills the LOSS_MARGIN values before and after a row: what stands in the neighbouring lane, and beyond
-       the outer lanes `left` and `right`, LOSS_EDGE values each. */
+    /** Fill the LOSS_MARGIN values before and after a row from the neighbouring lanes; beyond the outer lanes
+        come `left` and `right`, LOSS_EDGE values each. */
     void (*margins)(double *row, size_t count, const double *left, const double *right);
 
     /**
      * Column pass of the moments, the SSIM map of LOSS_GROUP rows, and its partials.
      *
      * @param moments  [in] LOSS_SPAN rows of each after the row pass, from WINDOW_RADIUS above the first
-     * @param counts   [in] 1 where a pixel has a place in the map and 0 elsewhere, one row for each
-     * @param weight   [in] of each row in the sum
-     * @param partials [out] LOSS_PARTIALS rows for each; 0 where `counts` is
+     * @param counts   [in] 1 for pixels that count in the map, else 0; one row each
+     * @param weight   [in] weight of each row in the sum
+     * @param partials [out] LOSS_PARTIALS rows each; 0 where `counts` is 0
      * @param sum      [in,out] [count], weight times map is added to it
      */
     void (*map)(const double *const moments[LOSS_MOMENTS][LOSS_SPAN], const double *const counts[LOSS_GROUP],

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/metrics.h -- how far an image is from a photo: PSNR, SSIM, FLIP; and the training loss with its
-   gradient. */
+/* image/metrics.h -- image metrics (PSNR, SSIM, FLIP), scores of a render against a photo, and the training
+   loss with its gradient. */
 #ifndef GBT_IMAGE_METRICS_H
 #define GBT_IMAGE_METRICS_H
 
@@ -8,7 +8,7 @@
 
 #include "base/image.h"
 
-#define METRIC_PSNR_MAX 100.0 /* dB, stated for images that are equal or nearly so */
+#define METRIC_PSNR_MAX 100.0 /* dB, reported for images that are equal or nearly so */
 
 /**
  * Peak signal to noise ratio, dB: 20 log10(1 / sqrt(mse)) over all values, in double, at most
@@ -27,10 +27,9 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
  * Mean SSIM over all pixels and channels, in double.
  *
  * 11 x 11 Gaussian of sigma 1.5, zero padding, window not renormalised at borders, C1 = 0.01^2, C2 = 0.03^2,
- * variances E[x^2] - mu^2. Identical images give exactly 1. The products of floats are exact in double, so
- * the variances are good to 1e-15 of E[x^2] (a float32 form needs two passes: in one it gives 1.00003 for
- * constant images, -0.3 for constant 255). Images smaller than the window are as good as any: what is beyond
- * the border is 0 in both.
+ * variances E[x^2] - mu^2. Identical images give exactly 1. Products of floats are exact in double, so
+ * variances are accurate to 1e-15 of E[x^2]. (In float32 this one-pass form gives 1.00003 for constant
+ * images, and -0.3 for constant 255.) Images may be smaller than the window: both are 0 beyond the border.
  *
  * @param a, b  equal width, height (from 1 x 1) and channels (any number)
  * @param ssim [out] (-1, 1]; NaN when the sizes differ, or a value is not finite
@@ -39,8 +38,8 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
  */
 gbt_status metric_ssim(const image *a, const image *b, double *ssim, gbt_error *err);
 
-/** The same mean over the pixels whose window lies wholly inside, which is free of any choice about borders;
-    NaN below 11 x 11 pixels. */
+/** The mean over the pixels whose window is entirely inside the image, which does not depend on how borders
+    are treated; NaN below 11 x 11 pixels. */
 gbt_status metric_ssim_interior(const image *a, const image *b, double *ssim, gbt_error *err);
 
 /**
@@ -59,16 +58,16 @@ gbt_status metric_flip(const image *a, const image *reference, double *mean, ima
 /** Round to 8 bit as the PNG writer does, in place: floor(clamp(x) * 255 + 0.5) / 255; NaN becomes 0. */
 void image_quantize(image *im);
 
-/** What a picture is scored by. NaN without a pixel that counts. */
+/** Scores of an image. NaN when no pixel is valid. */
 typedef struct image_scores {
     double psnr, ssim, flip;
 } image_scores;
 
 /**
- * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). The others are 0 in both images for the
- * windows and filters, and count in no mean.
+ * PSNR, SSIM and FLIP of the pixels where `valid` (NULL: all). Invalid pixels are 0 in both images for
+ * windows and filters, and are excluded from the means.
  *
- * @param a, photo  3 channels, equal size; round them first (image_quantize()), as everybody scores pictures
+ * @param a, photo 3 channels, equal size; round them first (image_quantize()), as published scores do
  * @param flip_map  [out] optional: 1 channel, of their size, allocated by the caller; 0 where not valid
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
  */
@@ -77,32 +76,32 @@ gbt_status image_score(const image *a, const image *photo, const unsigned char *
 
 /**
  * image_score() as every command scores a render against its photo: both are rounded to 8 bit; with
- * `exposure` the right halves count, after affine_split().
+ * `exposure` only the right halves are scored, after affine_split().
  *
- * @param render, photo [in,out] rounded; the render through the matrix of affine_split()
- * @param flip_map      [out] optional, as for image_score(); always of the whole pictures
+ * @param render, photo [in,out] rounded; the render is also multiplied by the matrix of affine_split()
+ * @param flip_map      [out] optional, as in image_score(); always covers the whole images
  */
 gbt_status image_score_photo(image *render, image *photo, const unsigned char *valid, bool exposure,
                              image *flip_map, image_scores *out, gbt_error *err);
 
 /**
- * PSNR after the 3 x 4 colour matrix that brings the render nearest to the photo, by least squares
- * (affine_fit()): what would be left if the photo's exposure were known.
+ * PSNR after applying to the render the 3 x 4 colour matrix that fits it best to the photo (affine_fit()):
+ * the error that remains if the photo's exposure were known.
  *
  * @param first_column [in] the columns from here on are fitted and scored
- * @param psnr [out] dB; NaN without a pixel that counts
+ * @param psnr [out] dB; NaN when no pixel is valid
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  */
 gbt_status image_psnr_fitted(const image *render, const image *photo, const unsigned char *valid,
                              int first_column, double *psnr, gbt_error *err);
 
-/** LPIPS (eval/lpips.h): its network fed with colours in [-1, 1], as it was trained, and in [0, 1], as 3DGS
-    and its successors do. */
+/** LPIPS (eval/lpips.h): with colours scaled to [-1, 1], as the network was trained, and left in [0, 1], as
+    3DGS and its successors do. */
 typedef struct lpips_scores {
     double lpips, lpips_01;
 } lpips_scores;
 
-/** Share of 1 - SSIM in the loss of pictures, the other is L1's (Kerbl 2023, eq 7). */
+/** Weight of 1 - SSIM in the image loss; L1 has the rest (Kerbl 2023, eq 7). */
 #define IMAGE_DSSIM_WEIGHT 0.2
 
 /** Scratch of image_loss(), reused from step to step. Start from {0}. */

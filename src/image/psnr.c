@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/psnr.c -- PSNR of what is compared everywhere: images rounded to 8 bit or not, values in [0, 1]. */
+/* image/psnr.c -- PSNR of images with values in [0, 1], and rounding to 8 bit. */
 #include "image/metrics.h"
 
 #include <math.h>
@@ -16,7 +16,7 @@ double metric_psnr_valid(const image *a, const image *b, const unsigned char *va
     size_t left_out = 0;
     for (int y = 0; y < a->height; y++) {
         const float *row_a = a->pixels + (size_t)y * row_values, *row_b = b->pixels + (size_t)y * row_values;
-        double row_sum = 0; /* sums of sums keep the rounding error of millions of terms small */
+        double row_sum = 0; /* summing per row first keeps the rounding error of millions of terms small */
         for (size_t x = 0; x < width; x++) {
             const bool counts = valid == NULL || valid[(size_t)y * width + x] != 0;
             left_out += !counts;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* image/score.c -- a picture against a photo: all three measures, over the pixels that mean something. */
+/* image/score.c -- PSNR, SSIM and FLIP of a render against a photo, over the valid pixels. */
 #include "image/metrics.h"
 
 #include <math.h>
@@ -19,8 +19,8 @@ static gbt_status copy_masked(const image *in, const unsigned char *valid, image
     return GBT_OK;
 }
 
-/* The mean of the map where it is valid; elsewhere it becomes 0, since what a filter carries there is
-   nobody's error. */
+/* Mean of the map over valid pixels. Elsewhere the map is set to 0: values that filters spread there are not
+   errors. */
 static double masked_mean(image *map, const unsigned char *valid)
 {
     double sum = 0;
@@ -47,7 +47,7 @@ static gbt_status score_masked(const image *a, const image *photo, const unsigne
         status = image_alloc(&gradient, a->width, a->height, 3, err);
     if (status == GBT_OK)
         status = image_loss(a, photo, valid, 1, &scratch, &gradient, &loss,
-                            err); /* it knows how to leave pixels out of SSIM's windows */
+                            err); /* image_loss() can exclude pixels from SSIM's windows */
     if (status == GBT_OK && flip_map == NULL)
         status = image_alloc(&map, a->width, a->height, 1, err);
     image *const used = flip_map != NULL ? flip_map : &map;

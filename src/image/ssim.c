@@ -42,7 +42,7 @@ static void ssim_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* Mean over the pixels that are at least `border` from all four sides. */
+/* Mean over the pixels that are at least `border` pixels from all four sides. */
 static gbt_status mean_ssim(const image *a, const image *b, size_t border, double *ssim, gbt_error *err)
 {
     *ssim = (double)NAN;

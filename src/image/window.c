@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* image/window.c -- the inner loops of SSIM.
 
-   The bodies are plain loops that GCC turns into vectors of whatever width the calling function is compiled
-   for. `ivdep` says what the interface says, that outputs are apart from inputs: GCC gives up on run-time
+   The bodies are plain loops, which GCC vectorises with the width of the function they are inlined into.
+   `ivdep` states what the interface requires, that outputs do not overlap inputs: GCC gives up on run-time
    checks between this many arrays. */
 #include "image/window.h"
 
@@ -58,7 +58,7 @@ BODY double similarity_at(const double *const in[WINDOW_MOMENTS], size_t i, ptrd
     const double covariance = across(in[4] + i, step) - a * b;
     const double n1 = 2 * (a * b) + c1, n2 = 2 * covariance + c2;
     const double d1 = a * a + b * b + c1, d2 = variance_x + variance_y + c2;
-    return (n1 * n2) / (d1 * d2); /* x = y makes both products the same number, so this is exactly 1 */
+    return (n1 * n2) / (d1 * d2); /* for x = y both products are the same number, so this is exactly 1 */
 }
 
 BODY void map_body(const double *const in[WINDOW_MOMENTS], size_t count, size_t step, double *restrict map)
@@ -95,7 +95,7 @@ void window_rows(const float *pixels, size_t count, size_t height, size_t row, c
                  const float *rows[WINDOW_TAPS])
 {
     for (size_t k = 0; k < WINDOW_TAPS; k++) {
-        const size_t shifted = row + k; /* by WINDOW_RADIUS, so that it cannot be negative */
+        const size_t shifted = row + k; /* shifted by WINDOW_RADIUS, so that it cannot be negative */
         const bool is_inside = shifted >= WINDOW_RADIUS && shifted - WINDOW_RADIUS < height;
         rows[k] = is_inside ? pixels + (shifted - WINDOW_RADIUS) * count : zeros;
     }

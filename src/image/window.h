@@ -4,8 +4,8 @@
 
    The window is the 11 x 11 Gaussian of sigma 1.5 with zero padding, not renormalised at borders, applied as
    a column pass and a row pass. Rows are [width][channels] as in `image`, so a row pass steps by `channels`
-   and treats all channels at once. Doubles are needed: E[x^2] - mu^2 against C2 = 9e-4 in float32 is wrong by
-   1e-4 of the gradient in even parts of a photo.
+   and treats all channels at once. Doubles are needed: in float32, cancellation in E[x^2] - mu^2 compared
+   with C2 = 9e-4 causes errors of 1e-4 of the gradient in uniform parts of a photo.
 
    Every variant does the same operations in the same order without fused multiply-add, so all give the same
    bits. */
@@ -38,11 +38,11 @@ typedef struct window_kernels {
 /** The widest set that cpu_best_isa() allows. */
 const window_kernels *window_kernels_best(void);
 
-/** Pointers to the 11 rows around `row`, `count` values each; `zeros` stands for those outside the image. */
+/** Pointers to the 11 rows around `row`, of `count` values each; rows outside the image point to `zeros`. */
 void window_rows(const float *pixels, size_t count, size_t height, size_t row, const float *zeros,
                  const float *rows[WINDOW_TAPS]);
 
-/** Sum in a fixed order of eight interleaved parts: the same bits for every instruction set. */
+/** Sum as eight interleaved partial sums in a fixed order: the same bits for every instruction set. */
 double window_sum(const double *values, size_t count);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/compare_images.c -- two pictures, how far apart: what bench/versus_metrics holds against other
-   programs. */
+/* eval/compare_images.c -- scores of one image against another (bench/versus_metrics compares them with other
+   programs). */
 #include <math.h>
 #include <string.h>
 
@@ -10,7 +10,7 @@
 #include "gbtrace/evaluate.h"
 #include "image/metrics.h"
 
-/* Three channels, rounded to 8 bit. */
+/* Read an image as three channels, rounded to 8 bit. */
 static gbt_status read_colors(const char *path, image *out, gbt_error *err)
 {
     GBT_TRY(image_read(path, out, err));
@@ -23,7 +23,7 @@ static gbt_status read_colors(const char *path, image *out, gbt_error *err)
     return GBT_OK;
 }
 
-/* Of two quantized images. */
+/* All scores of two images that are already rounded. */
 static gbt_status compare(const image *a, const image *b, gbt_comparison *out, gbt_error *err)
 {
     *out = (gbt_comparison){
@@ -33,7 +33,7 @@ static gbt_status compare(const image *a, const image *b, gbt_comparison *out, g
     return metric_flip(a, b, &out->flip, NULL, err);
 }
 
-/* Freed by the caller, whatever happens. */
+/* Read both images; the caller frees them, also after a failure. */
 static gbt_status read_pair(const char *path, const char *reference, image *a, image *b, gbt_error *err)
 {
     GBT_TRY(read_colors(path, a, err));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips.c -- the networks of LPIPS (Simonyan 2015, Krizhevsky 2012), their weights out of a file, and
-   the distance.
+/* eval/lpips.c -- LPIPS: the networks (Simonyan 2015, Krizhevsky 2012), reading their weights, and the
+   distance.
 
    picture --> (x - shift) / scale --> [maxima] convolution + ReLU, again and again
         --> distance of two pictures at five layers */
@@ -20,10 +20,10 @@
 enum { LAYERS_MAX = 13, TAPS = 5, PICTURES = 2 };
 
 typedef struct layer {
-    const char *name; /* of its arrays: NAME.weight, NAME.bias */
+    const char *name; /* prefix of its arrays: NAME.weight, NAME.bias */
     int out, kernel, stride, pad;
-    int pool; /* side of the window of the maxima that come before it; 0: none */
-    bool tap; /* compared after this one */
+    int pool; /* side of the max-pooling window before it; 0: none */
+    bool tap; /* features are compared after this layer */
 } layer;
 
 typedef struct architecture {
@@ -32,7 +32,7 @@ typedef struct architecture {
     layer layers[LAYERS_MAX];
 } architecture;
 
-/* As torchvision numbers them, sliced as the package `lpips` does. */
+/* Layers with torchvision's numbers, divided into slices as in the package `lpips`. */
 static const architecture architectures[] = {
     {"vgg",
      13,
@@ -62,7 +62,7 @@ enum { ARCHITECTURES = sizeof architectures / sizeof *architectures };
 struct lpips {
     const architecture *is;
     convolution layers[LAYERS_MAX];
-    tensor taps[TAPS]; /* [1][channels] weights of squared differences */
+    tensor taps[TAPS]; /* [1][channels] weights of the squared feature differences */
 };
 
 /* ---- the file ---- */
@@ -79,7 +79,8 @@ static gbt_status read_array(const source_file *file, const char *layer_name, co
     return GBT_OK;
 }
 
-/* The file's [out][in][ky][kx] to the product's [ky][kx][in][out]. */
+/* Transpose weights from the file's [out][in][ky][kx] to [ky][kx][in][out], the order of the matrix
+   product. */
 static gbt_status turn_weights(const tensor *from, convolution *c, gbt_error *err)
 {
     const size_t in = (size_t)c->in, out = (size_t)c->out, area = (size_t)c->kernel * (size_t)c->kernel;
@@ -103,14 +104,14 @@ static gbt_status read_layer(const source_file *file, const layer *is, int in, c
                                    (size_t)(in * is->kernel * is->kernel), &weights, err);
     if (status == GBT_OK)
         status = read_array(file, is->name, "bias", 1, (size_t)is->out, &bias, err);
-    out->bias = bias.values; /* moved */
+    out->bias = bias.values; /* ownership moves */
     if (status == GBT_OK)
         status = turn_weights(&weights, out, err);
     mem_free(weights.values);
     return status;
 }
 
-/* The first layer alone tells the networks apart. */
+/* The network is recognised by its first layer. */
 static gbt_status find_architecture(const source_file *file, const architecture **out, gbt_error *err)
 {
     tensor first;
@@ -187,7 +188,7 @@ static double length_of(const float *v, int count)
     double sum = 0;
     for (int i = 0; i < count; i++)
         sum += (double)v[i] * (double)v[i];
-    return sqrt(sum) + 1e-10; /* what the definition adds */
+    return sqrt(sum) + 1e-10; /* the epsilon of the definition */
 }
 
 static void distance_rows(size_t block, size_t begin, size_t end, void *context)
@@ -209,7 +210,7 @@ static void distance_rows(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* Added to `sum`: the mean over the pixels. */
+/* Add to `sum` the mean over the pixels of the weighted squared differences of normalised features. */
 static gbt_status add_distance(const feature_plane of[PICTURES], const tensor *weight, double *sum,
                                gbt_error *err)
 {
@@ -226,15 +227,15 @@ static gbt_status add_distance(const feature_plane of[PICTURES], const tensor *w
     return GBT_OK;
 }
 
-/* What is compared: `picture`, but the photo where that does not count, from a column on. */
+/* An input image: `picture`, replaced by the photo at invalid pixels, from a column on. */
 typedef struct seen {
     const image *picture, *photo;
     const unsigned char *valid; /* NULL: all */
     int first_column;
 } seen;
 
-/* What the network sees of it: colours to [low, 1], then the mean and the spread of what it was trained
-   on. */
+/* Prepare the network input: scale colours to [low, 1], then normalise by the mean and standard deviation of
+   the training data. */
 static gbt_status feed(const seen *s, float low, int pad, feature_plane *out, gbt_error *err)
 {
     static const float shift[3] = {-0.030f, -0.088f, -0.188f}, scale[3] = {0.458f, 0.448f, 0.450f};
@@ -252,7 +253,7 @@ static gbt_status feed(const seen *s, float low, int pad, feature_plane *out, gb
     return GBT_OK;
 }
 
-/* One layer of one picture; `plane` becomes what comes out, with the border that `pad` says. */
+/* Apply one layer to one image; `plane` is replaced by the output, with a border of `pad` pixels. */
 static gbt_status advance(const layer *l, const convolution *c, int pad, feature_plane *plane, gbt_error *err)
 {
     feature_plane pooled = {0}, out = {0};

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips.h -- LPIPS (Zhang 2018, version 0.1): how far apart two pictures are for a network that
+/* eval/lpips.h -- LPIPS (Zhang 2018, version 0.1): distance of two images in the features of a network that
    was trained on photos.
 
-   The network is the user's: a .safetensors file of what the Python package `lpips` calls its state
+   The user provides the network: a .safetensors file with the state_dict of the Python package `lpips`
    (docs/metrics.md says how to make one). */
 #ifndef GBT_EVAL_LPIPS_H
 #define GBT_EVAL_LPIPS_H
@@ -24,17 +24,18 @@ void lpips_close(lpips *net); /* NULL is fine */
 const char *lpips_network(const lpips *net); /* "vgg" or "alex" */
 
 /**
- * Both scores of a render: per layer, features scaled to unit length per pixel, their squared differences
- * weighted per channel, the mean over the pixels; the sum over five layers. 0 for equal pictures.
+ * Both scores of a render. For each of five layers, features are normalised to unit length per pixel, their
+ * squared differences are weighted per channel and averaged over the pixels; the score is the sum over the
+ * layers. 0 for equal images.
  *
  * @param render, photo [in] 3 channels, equal size, values in [0, 1]
- * @param valid         [in] optional (NULL), [height][width]: where 0, the render is taken to be the photo
- * @param first_column  [in] what lies left of it is cut off; the rest has at least 16 (VGG16) or 31 (AlexNet)
- *                           pixels on each side
+ * @param valid         [in] optional (NULL), [height][width]: where 0, the render is replaced by the photo
+ * @param first_column  [in] columns left of it are cut off; the rest must have at least 16 (VGG16) or 31
+ *                           (AlexNet) pixels on each side
  * @return GBT_OK, GBT_ERR_ARGUMENT (sizes), GBT_ERR_NO_MEMORY
  * Threads: parallel inside; the same bits for every number of threads and every instruction set.
- * Cost: VGG16 1.2 million multiply-adds (two pictures, each fed twice) and up to 1 kB per pixel; AlexNet 60
- * thousand.
+ * Cost: VGG16 1.2 million multiply-adds (two images, each evaluated twice) and up to 1 kB per pixel; AlexNet
+ * 60 thousand multiply-adds.
  */
 gbt_status lpips_compare(const lpips *net, const image *render, const image *photo,
                          const unsigned char *valid, int first_column, lpips_scores *out, gbt_error *err);

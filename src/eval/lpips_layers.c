@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips_layers.c -- a convolution is one matrix product per row of the picture and row of the kernel:
-   with the channels of a pixel side by side, what a row of the kernel covers is one run of numbers, and the
-   next pixel's run begins `stride` pixels later. */
+/* eval/lpips_layers.c -- convolution as matrix products, one per row of the image and row of the kernel.
+   Because the channels of a pixel are adjacent in memory, a kernel row covers contiguous numbers, and those
+   of the next output pixel begin `stride` pixels later. */
 #include "eval/lpips_layers.h"
 
 #include <math.h>
@@ -39,7 +39,7 @@ void convolution_free(convolution *c)
     *c = (convolution){0};
 }
 
-/* Pixels of a side that a window of `size` meets, `stride` apart. */
+/* Number of positions of a window of `size` along a side, `stride` apart. */
 static int steps_of(int side, int size, int stride) { return side < size ? 0 : (side - size) / stride + 1; }
 
 typedef struct convolve_job {
@@ -65,7 +65,7 @@ static void convolve_rows(size_t block, size_t begin, size_t end, void *context)
                 .a_step = 1,
                 .b = c->weights + (size_t)k * run * (size_t)c->out,
                 .b_row = (size_t)c->out,
-                .bias = k == 0 ? c->bias : NULL, /* the other rows add to it */
+                .bias = k == 0 ? c->bias : NULL, /* products of later kernel rows are added to the first */
                 .relu = k == c->kernel - 1,
                 .c = feature_plane_at(job->out, 0, (int)y),
                 .c_row = (size_t)c->out};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/lpips_layers.h -- pictures of features, and what an image network makes of them: convolutions with
-   ReLU, and maxima. */
+/* eval/lpips_layers.h -- feature maps, and the layers of an image network: convolution with ReLU, and
+   max-pooling. */
 #ifndef GBT_EVAL_LPIPS_LAYERS_H
 #define GBT_EVAL_LPIPS_LAYERS_H
 
@@ -8,19 +8,20 @@
 
 #include "gbtrace/status.h"
 
-/** [height + 2 pad][width + 2 pad][channels], zeros around the picture. Start from {0}; free with
+/** [height + 2 pad][width + 2 pad][channels], with zeros around the image. Start from {0}; free with
     feature_plane_free(). */
 typedef struct feature_plane {
     int width, height, channels, pad;
     float *values; /* owned */
 } feature_plane;
 
-/** Zeros. GBT_ERR_ARGUMENT when there would be no pixel: the picture was too small for the network. */
+/** Make a feature map of zeros. GBT_ERR_ARGUMENT when it would have no pixel: the image was too small for the
+    network. */
 gbt_status feature_plane_make(int width, int height, int channels, int pad, feature_plane *out,
                               gbt_error *err);
 void feature_plane_free(feature_plane *p);
 
-/** The features of pixel (x, y), which may lie up to `pad` outside. */
+/** The features of pixel (x, y), which may be up to `pad` pixels outside the image. */
 static inline float *feature_plane_at(const feature_plane *p, int x, int y)
 {
     const size_t row = (size_t)(p->width + 2 * p->pad);
@@ -28,7 +29,7 @@ static inline float *feature_plane_at(const feature_plane *p, int x, int y)
 }
 
 typedef struct convolution {
-    int in, out, kernel, stride, pad; /* channels; pixels. `out` is a multiple of 16 */
+    int in, out, kernel, stride, pad; /* in, out: channels, `out` a multiple of 16; the others: pixels */
     float *weights;                   /* [kernel][kernel][in][out], owned */
     float *bias;                      /* [out], owned */
 } convolution;
@@ -38,8 +39,8 @@ void convolution_free(convolution *c);
 /**
  * out = max(0, bias + sum of weights x pixels of `in` around stride x (x, y)).
  *
- * @param in  [in]  channels and pad of the convolution
- * @param pad [in]  that `out` gets, for what comes next
+ * @param in  [in]  has the channels and padding that the convolution needs
+ * @param pad [in]  padding of `out`, for the next layer
  * @return GBT_OK, GBT_ERR_ARGUMENT (too small), GBT_ERR_NO_MEMORY
  * Threads: parallel inside, by rows; the same bits for every number of threads and every instruction set.
  * Cost: width x height x kernel^2 x in x out multiply-adds, at the speed of the decoder's matrix product.
@@ -47,8 +48,8 @@ void convolution_free(convolution *c);
 gbt_status convolve(const convolution *c, const feature_plane *in, int pad, feature_plane *out,
                     gbt_error *err);
 
-/** The largest of each window of size x size pixels, every second pixel, where the whole window is in the
-    picture. Errors: convolve(). */
+/** Max-pooling with windows of size x size pixels and stride 2; only windows entirely inside the image.
+    Errors: convolve(). */
 gbt_status pool_max(const feature_plane *in, int size, int pad, feature_plane *out, gbt_error *err);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/score_files.c -- scores as JSON and as events of TensorBoard. */
+/* eval/score_files.c -- write scores as JSON and as TensorBoard events. */
 #include "eval/score_files.h"
 
 #include <stdio.h>
@@ -64,7 +64,7 @@ static json_t *from_scores(const evaluation *e)
     return root;
 }
 
-/* What training left in train.json goes into metrics.json too: one file says everything about a run. */
+/* Copy the contents of train.json into metrics.json, so that one file has everything about a run. */
 static void add_training(json_t *root, const char *run)
 {
     char path[4096];

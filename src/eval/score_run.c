@@ -15,7 +15,7 @@
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
 
-/* The pictures of a view, each with what became of its file. */
+/* The images of a view, each with the status of writing its file. */
 typedef struct view_pictures {
     const image *picture[3];
     const char *path[3];
@@ -43,7 +43,7 @@ static gbt_status write_view(view_pictures *p, gbt_error *err)
     return GBT_OK;
 }
 
-/* Pictures go into `folder`; NULL: none. */
+/* Score one view; images are written into `folder` (NULL: not written). */
 static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, const char *folder,
                              view_score *score, gbt_error *err)
 {
@@ -63,7 +63,8 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
         status = image_alloc(&error_map, render->width, render->height, 1, err);
     if (status == GBT_OK)
         status = image_score_photo(render, &photo, valid, r->def.exposure, &error_map, &scores, err);
-    const int first_column = r->def.exposure ? render->width / 2 : 0; /* as image_score_photo() scores */
+    const int first_column = r->def.exposure ? render->width / 2 : 0; /* the same columns as in
+                                                                         image_score_photo() */
     if (status == GBT_OK)
         status = image_psnr_fitted(render, &photo, valid, first_column, &score->psnr_fitted, err);
     score->psnr = scores.psnr;
@@ -72,7 +73,7 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     score->masked = valid != NULL;
     if (status == GBT_OK && net != NULL)
         status = lpips_compare(net, render, &photo, valid, first_column, &score->lpips, err);
-    if (isnan(score->psnr)) /* without a pixel that counts both pictures are the photo, and LPIPS is 0 */
+    if (isnan(score->psnr)) /* without a valid pixel both inputs are the photo and LPIPS would be 0 */
         score->lpips = (lpips_scores){(double)NAN, (double)NAN};
     if (status == GBT_OK && folder != NULL)
         status = view_score_paths(score, folder, err);
@@ -86,7 +87,7 @@ static gbt_status score_view(loaded_run *r, size_t index, const lpips *net, cons
     return status;
 }
 
-/* Views are dealt out to the processes. */
+/* Score this process's share of the views. */
 static gbt_status score_own_views(loaded_run *r, const lpips *net, const char *folder, evaluation *e,
                                   gbt_error *err)
 {
@@ -107,7 +108,8 @@ static gbt_status score_own_views(loaded_run *r, const lpips *net, const char *f
     return GBT_OK;
 }
 
-/* e->views, of which this process has its own in front: everybody's, in the order of the views. */
+/* Gather the scores of all processes into e->views, in the order of the views. Before, e->views begins with
+   those of this process. */
 static gbt_status collect_scores(evaluation *e, gbt_error *err)
 {
     enum { WORDS = sizeof(view_score) / sizeof(uint32_t) };

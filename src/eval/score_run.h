@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/score_run.h -- the held-out views of a run, rendered and compared with their photos. */
+/* eval/score_run.h -- render the held-out views of a run and score them against their photos. */
 #ifndef GBT_EVAL_SCORE_RUN_H
 #define GBT_EVAL_SCORE_RUN_H
 
@@ -11,7 +11,7 @@
  * Render and score every held-out view.
  *
  * @param pictures [in] write renders, photos and FLIP maps into RUN/renders/test
- * @param net [in] optional (NULL): LPIPS too
+ * @param net [in] optional (NULL): also compute LPIPS
  * @param e   [out] start from {0}; free e->views with mem_free() after success or failure; means are NaN
  *                  without views
  */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* eval/scores.c -- where the pictures of a scored view are. */
+/* eval/scores.c -- paths of the images of a scored view. */
 #include "eval/scores.h"
 
 #include <stdio.h>

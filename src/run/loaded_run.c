@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* run/loaded_run.c -- open a trained run for rendering. */
+/* run/loaded_run.c -- open a trained run, or plain Gaussians, for rendering. */
 #include "run/loaded_run.h"
 
 #include <jansson.h>
@@ -24,7 +24,7 @@
 #include "train/run_split.h"
 #include "train/seen_points.h"
 
-/* What a result folder says beside its Gaussians: the data set, and what is behind them. */
+/* Read what a result folder says besides its Gaussians: the data set and the background. */
 static gbt_status describe_folder(const char *path, loaded_run *out, gbt_error *err)
 {
     result_folder folder;
@@ -70,7 +70,7 @@ void loaded_run_take_cloud(loaded_run *r, gaussian_cloud *cloud)
         const double before = r->model.origin[k];
         r->model.origin[k] = c->origin[k] + middle[k];
         c->origin[k] = 0;
-        for (size_t i = 0; i < r->scene.view_count; i++) /* of views that are open */
+        for (size_t i = 0; i < r->scene.view_count; i++) /* if views are open */
             r->scene.views[i].camera.center[k] += before - r->model.origin[k];
     }
 }
@@ -84,7 +84,7 @@ static gbt_status open_cloud(const char *path, loaded_run *out, gbt_error *err)
     return file_is_folder(path) ? describe_folder(path, out, err) : GBT_OK;
 }
 
-/* The .ply of a result folder, or the file itself. */
+/* Path of the .ply in a result folder, or of the file itself. */
 static gbt_status find_ply(const char *run, char out[RESULT_PATH_SIZE], bool *found, gbt_error *err)
 {
     result_folder folder;
@@ -106,7 +106,8 @@ gbt_status loaded_run_is_larger(const char *run, size_t memory, bool *large, gbt
     GBT_TRY(find_ply(run, ply, large, err));
     if (!*large)
         return GBT_OK;
-    gbt_error why = {0}; /* what cannot be read by parts is read whole, and says what is wrong with it */
+    gbt_error why = {0}; /* a file that cannot be read in parts is read at once later, which reports any
+                            error */
     *large = gaussian_ply_open(ply, &parts, &why) == GBT_OK &&
              cell_memory_whole(parts.count, parts.file.size) > memory;
     gaussian_ply_close(&parts);
@@ -146,7 +147,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
                          "%.1000s: not there (wanted a run, a model file or plain Gaussians)", path);
     GBT_TRY(model_load(path, &out->model, err));
     out->def = gbt_train_def_default();
-    out->def.footprint = 0; /* of models that do not say */
+    out->def.footprint = 0; /* default for models that do not store it */
     GBT_TRY(config_parse(out->model.config, path, &out->def, &out->strings, err));
     out->frame.draw = train_drawing_of(&out->def);
     out->frame.draw.anchor_pixel = out->model.anchor_pixel;
@@ -166,7 +167,8 @@ static gbt_status open_model(const char *run, loaded_run *out, gbt_error *err)
 
 static bool is_plain(const loaded_run *r) { return r->cloud.count > 0 || r->cells.count > 0; }
 
-/* Another data set of the same place has another local origin. */
+/* Move cameras and points to the model's local origin: another data set in the same coordinates has a
+   different one. */
 static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
 {
     for (size_t i = 0; i < out->scene.view_count; i++)
@@ -176,12 +178,12 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     if (downscale <= 0)
         downscale = out->def.downscale;
-    if (downscale <= 0) /* Gaussians of others */
+    if (downscale <= 0) /* Gaussians of other programs */
         GBT_TRY(photos_result_downscale(&out->scene, out->picture_width, out->reduced, &downscale, err));
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
 
-/* Where training found that the photos were taken. */
+/* Replace the poses of the data set by those that training refined. */
 static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
 {
     char path[4096];
@@ -213,7 +215,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     GBT_TRY(file_join(cameras, sizeof cameras, run, "cameras.json", err));
     if (data == NULL && is_plain(out) && !has_data && file_exists(cameras)) {
         GBT_TRY(cameras_json_load(cameras, &out->scene, err));
-        /* cfg_args says by what the data set's photos are divided, not these pictures */
+        /* the downscale of cfg_args is for the photos of the data set, not for the sizes in cameras.json */
         return place_views(downscale > 0 ? downscale : 1, out, err);
     }
     if (data == NULL && is_plain(out) && !has_data)
@@ -229,7 +231,7 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
     GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
-    if (!seen_points_tell(&out->scene)) /* as in training */
+    if (!seen_points_tell(&out->scene)) /* as training does */
         GBT_TRY(scene_forget_points(&out->scene, false, err));
     scene_set_alpha(&out->scene, out->def.alpha);
     out->poses_refined = false;
@@ -304,23 +306,23 @@ gbt_status loaded_run_preset(gbt_preset preset, trace_settings *settings, gbt_er
     return GBT_OK;
 }
 
-/* Files are named after views, and then have more behind the name: ".transmittance.exr", and while they are
-   written ".tmp". 255 bytes are what file systems take. */
+/* Files are named after views, with endings such as ".transmittance.exr", and ".tmp" while they are written;
+   file systems allow 255 bytes. */
 enum { FILE_NAME_MAX = 200, FILE_NAME_KEPT = 180 };
 
-/* A hash of all of the name behind what there is room for. */
+/* Append a hash of the whole name, after shortening the name if there is no room. */
 static void add_hash(const char *name, char out[FILE_NAME_SIZE])
 {
     size_t kept = strlen(out);
     const uint64_t hash = hash_bytes(HASH_START, name, strlen(name));
     if (kept > FILE_NAME_KEPT)
         kept = FILE_NAME_KEPT;
-    while (kept > 0 && ((unsigned char)out[kept] & 0xc0) == 0x80) /* never within a letter of UTF-8 */
+    while (kept > 0 && ((unsigned char)out[kept] & 0xc0) == 0x80) /* never cut within a UTF-8 sequence */
         kept--;
     snprintf(out + kept, FILE_NAME_SIZE - kept, "-%016llx", (unsigned long long)hash);
 }
 
-/* The dot before the ending of a photo. Of "1623.25", a time, ".25" is none. */
+/* The dot before the file ending of a photo. In a time such as "1623.25", ".25" is not an ending. */
 static const char *ending_of(const char *name)
 {
     static const char *const endings[] = {".png", ".jpg", ".jpeg", ".exr"};
@@ -331,7 +333,7 @@ static const char *ending_of(const char *name)
     return NULL;
 }
 
-/* Whether JSON can say it. */
+/* Whether the name is valid UTF-8, so that JSON can represent it. */
 static bool is_utf8(const char *name)
 {
     json_t *value = json_string(name);

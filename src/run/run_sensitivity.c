@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* run/run_sensitivity.c -- adjoint passes of random signs through the training views. */
+/* run/run_sensitivity.c -- estimate sensitivities by adjoint passes with random signs through the training
+   views. */
 #include "run/run_sensitivity.h"
 
 #include <string.h>
@@ -18,7 +19,8 @@ typedef struct probe {
     float *d_params;
 } probe;
 
-/* Half the run's resolution, and of that at most about PROBE_PIXELS, say the same as all. */
+/* Half the run's resolution, with at most about PROBE_PIXELS pixels, gives the same estimate as all
+   pixels. */
 static gbt_camera probe_camera(const loaded_run *r, size_t view, int *spacing)
 {
     const gbt_camera full = photos_camera(&r->photos, view, 0);
@@ -61,8 +63,8 @@ static gbt_status add_views(loaded_run *r, size_t count, model_sensitivity *out,
             continue;
         if (stop_signal_seen())
             status = base_fail(err, GBT_ERR_INTERRUPTED, MAKING_SMALL_STOPPED);
-        else if ((training + 1) * wanted / count > training * wanted / count) /* `wanted` of `count`, evenly
-                                                                               */
+        else if ((training + 1) * wanted / count > training * wanted / count) /* evenly choose `wanted` of
+                                                                                 `count` views */
             status = add_view(r, view, &p, out, err);
         training++;
     }

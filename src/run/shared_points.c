@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* run/shared_points.c -- what all photos show. */
+/* run/shared_points.c -- the part of the scene that most photos show. */
 #include "run/shared_points.h"
 
 #include <math.h>
@@ -14,8 +14,8 @@
 
 enum { ASKED_MOST = 20000, SHARED_LEAST = 20, POINT_BLOCK = 256 };
 
-static const double shown = 0.99;  /* of the points, in every picture */
-static const double border = 0.05; /* of half the picture */
+static const double shown = 0.99;  /* share of the points that must be in the image */
+static const double border = 0.05; /* margin, as a fraction of half the image */
 
 typedef struct point_job {
     const gbt_camera *cameras;

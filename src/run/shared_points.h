@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* run/shared_points.h -- what the photos have in common: the sparse points that most cameras see. */
+/* run/shared_points.h -- the sparse points that most cameras see, which define the common subject of the
+   photos. */
 #ifndef GBT_RUN_SHARED_POINTS_H
 #define GBT_RUN_SHARED_POINTS_H
 
@@ -10,13 +11,13 @@
 
 typedef struct shared_points {
     float *position; /* [count][3], scene-local; owned */
-    size_t count;    /* 0: cameras that look apart, or too few points */
+    size_t count;    /* 0: the cameras look in different directions, or there are too few points */
 } shared_points;
 
 /**
- * The points inside the pictures of at least two thirds as many cameras as see the point that most see.
- * Nothing is hidden by anything. None where no point is in the pictures of half the cameras, or where fewer
- * than 20 points are shared. Of many points every n-th is asked.
+ * Let m be the largest number of cameras whose image contains the same point. The shared points are those in
+ * the images of at least 2/3 m cameras; occlusion is ignored. There are none if m is less than half the
+ * cameras, or if fewer than 20 points qualify. Of many points only every n-th is tested.
  *
  * @param cameras [in] [count], count >= 1
  * @param points  [in] [point_count][3], scene-local
@@ -28,8 +29,8 @@ gbt_status shared_points_find(const gbt_camera *cameras, size_t count, const flo
 void shared_points_free(shared_points *shared); /* zeroes the struct */
 
 /**
- * By how much the view of a pinhole must be widened (tangents) to show all but 1 % of the points, 5 % of half
- * the picture within its border. Points behind the camera do not count.
+ * Factor by which the field of view of a pinhole camera (its tangents) must be widened to show all but 1 % of
+ * the points, with a margin of 5 % of half the image. Points behind the camera are ignored.
  *
  * @param scratch [count]
  * @return at least 1

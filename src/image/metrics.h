@@ -119,10 +119,10 @@ typedef struct image_loss_result {
 /**
  * L = (1 - w) mean|x - y| + w (1 - SSIM(x, y)) and dL/dx, over the pixels where `valid` (NULL: all).
  *
- * SSIM is that of metric_ssim(). Pixels that are not valid are 0 in both images for its windows, count in no
- * mean, and have gradient 0. No valid pixel: loss 0, ssim 1, gradient 0, mse NaN. At x = y the gradient of |x
- * - y| is taken as 0. Values that are not finite are not an error: they make `out->loss` NaN or infinite, so
- * test that before using d_x.
+ * SSIM is that of metric_ssim(). Invalid pixels are 0 in both images for its windows, are excluded from the
+ * means, and have gradient 0. Without any valid pixel: loss 0, ssim 1, gradient 0, mse NaN. At x = y the
+ * gradient of |x - y| is taken as 0. Non-finite values are not an error: they make `out->loss` NaN or
+ * infinite, so check it before using d_x.
  *
  * @param x             [in]  render, unclamped, 3 channels
  * @param y             [in]  photo, the size of x

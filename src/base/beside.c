@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/beside.c -- one job on a thread of its own. */
+/* base/beside.c -- run one job on a background thread. */
 #include "base/beside.h"
 
 #include <signal.h>
@@ -9,7 +9,7 @@
 
 static void *run_job(void *context)
 {
-    PLAIN_NUMBERS; /* a thread begins with the program's locale */
+    PLAIN_NUMBERS; /* a new thread has the program's locale */
     beside *b = context;
     b->run(b->context);
     atomic_store(&b->over, true);
@@ -23,7 +23,7 @@ void beside_start(beside *b, void (*run)(void *context), void *context)
     b->context = context;
     atomic_store(&b->over, false);
     sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before); /* a thread begins with the mask of who made it */
+    pthread_sigmask(SIG_SETMASK, &all, &before); /* a new thread inherits the signal mask of its creator */
     b->started = pthread_create(&b->thread, NULL, run_job, b) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (!b->started)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/beside.h -- one job on a thread of its own, beside what the caller goes on with: writing files. What
-   is to be computed goes by base/parallel.h. */
+/* base/beside.h -- run one job, such as writing files, on a background thread while the caller continues.
+   Computation uses base/parallel.h. */
 #ifndef GBT_BASE_BESIDE_H
 #define GBT_BASE_BESIDE_H
 
@@ -17,14 +17,14 @@ typedef struct beside {
     pthread_t thread;
 } beside;
 
-/** Begin `run(context)`; signals go to other threads. Where there is no thread to have it is done at once.
-   None may be started before beside_wait(). */
+/** Start `run(context)` in the background; the thread blocks all signals. If no thread can be created, the
+    job runs before this returns. Call beside_wait() before the next start. */
 void beside_start(beside *b, void (*run)(void *context), void *context);
 
-/** Has one been started and is it done? */
+/** Whether a started job has finished. */
 bool beside_is_over(beside *b);
 
-/** Until it is done; nothing when none was started. */
+/** Wait until the job has finished; returns at once when none was started. */
 void beside_wait(beside *b);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera.c -- a camera's rays and pixels; the same camera at other sizes. */
+/* base/camera.c -- rays and pixels of a camera, and the camera of a resized, cropped or subsampled image. */
 #include "base/camera_lens.h"
 #include "base/camera_model.h"
 #include "base/camera_pose.h"
@@ -65,12 +65,13 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
     const int focal_count = camera_focal_count(camera->model), center = camera_center_at(camera->model);
     if (focal_count == 0 || step < 1 || camera->width < step || camera->height < step)
         return false;
-    const double edge = 0.5 - 0.5 * step; /* of the first pixel of `out`, from that of `camera` */
+    const double edge = 0.5 - 0.5 * step; /* offset of the edge of the first pixel of `out` from that of
+                                             `camera` */
     *out = camera_reading(camera, x + edge, y + edge, (double)step * (camera->width / step),
                           (double)step * (camera->height / step));
     out->width = camera->width / step;
     out->height = camera->height / step;
-    /* The middle of pixel i of `out`, i + 0.5, is the middle of pixel x + step i of `camera`. */
+    /* The centre of pixel i of `out`, i + 0.5, is the centre of pixel x + step i of `camera`. */
     for (int i = 0; i < focal_count; i++)
         out->params[i] /= step;
     out->params[center] = (camera->params[center] - x - 0.5) / step + 0.5;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_axes.c -- the point nearest to all axes, and whether it says enough. */
+/* base/camera_axes.c -- the point nearest to all optical axes, and whether it is well determined. */
 #include "base/camera_axes.h"
 
 #include <string.h>

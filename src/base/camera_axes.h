@@ -9,11 +9,12 @@
 #include "gbtrace/camera.h"
 
 /**
- * The point nearest to all axes: least squares, sum (I - d d^T) (x - c) = 0.
+ * The point x with the least sum of squared distances to all axes (centre c, direction d): sum (I - d d^T) (x
+ * - c) = 0.
  *
- * @param middle [in]  mean of the centres: distances are from it
- * @param out    [out] the point, where true
- * @return false where it does not say enough: the axes are nearly parallel (the mean squared sine of the
+ * @param middle [in]  mean of the centres, used as the local origin
+ * @param out    [out] the point, when true is returned
+ * @return false when the point is not meaningful: the axes are nearly parallel (the mean squared sine of the
  *         angles between them below 0.01, 6 degrees), or it is not in front of most cameras
  */
 bool camera_axes_meet(const gbt_camera *cameras, size_t count, const double middle[3], double out[3]);

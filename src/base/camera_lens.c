@@ -4,10 +4,10 @@
    direction --[kind: X/Z | theta | closed form]--> plane point
         --[radial N/D, tangential, prism]--> distorted --[f, c]--> pixel
 
-   A model is a row that says where that one pipeline takes its parameters (base/camera_model.c), so the
-   inversion is written once. The radial part is only used up to the first radius where it stops increasing:
-   beyond it the formula folds back into the image, and a point there would be drawn on top of others.
-   docs/cameras.md has the formulas. */
+   A model is a table row that maps its parameters to this pipeline (base/camera_model.c), so the inversion is
+   written once. The radial part is used only up to the first radius at which it stops increasing: beyond it
+   the formula folds back into the image, and points there would be drawn over others. docs/cameras.md has the
+   formulas. */
 #include "base/camera_lens.h"
 
 #include <math.h>
@@ -31,7 +31,7 @@ void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, do
     tan_half[1] = height / (2 * (turn ? lens->fy / PI : lens->fy));
 }
 
-/* Both eigenvalues have a positive real part: the map has not folded over. */
+/* Both eigenvalues of the Jacobian have a positive real part: the map has not folded over. */
 static bool unfolded(const double j[4]) { return j[0] * j[3] - j[1] * j[2] > 0 && j[0] + j[3] > 0; }
 
 static bool distort(const camera_lens *lens, double p[2])
@@ -53,10 +53,10 @@ static bool distort(const camera_lens *lens, double p[2])
     return unfolded(jacobian);
 }
 
-/* A coordinate that is not a number, or whose square is not, has no ray. */
+/* A coordinate that is NaN, or whose square overflows, has no ray. */
 static bool is_usable(const double p[2]) { return fabs(p[0]) < 1e100 && fabs(p[1]) < 1e100; }
 
-/* Towards (p, z), or, by a fisheye, at the angle |p|. */
+/* Unit vector towards (p, z), or, for a fisheye lens, at the angle |p| from the axis. */
 static bool unit_direction(const camera_lens *lens, const double p[2], double z, double dir[3])
 {
     if (lens->kind == LENS_FISHEYE) {
@@ -87,7 +87,7 @@ static bool unproject_fov(const camera_lens *lens, double p[2])
     return true;
 }
 
-/* Z from X = x, Y = y and alpha sqrt(beta (X^2 + Y^2) + Z^2) + (1 - alpha) Z = 1. */
+/* Solve for Z, with X = x, Y = y and alpha sqrt(beta (X^2 + Y^2) + Z^2) + (1 - alpha) Z = 1. */
 static bool unproject_eucm(const camera_lens *lens, const double p[2], double *z)
 {
     const double alpha = lens->shape[0], b = lens->shape[1] * (p[0] * p[0] + p[1] * p[1]);
@@ -96,7 +96,7 @@ static bool unproject_eucm(const camera_lens *lens, const double p[2], double *z
         return false;
     const double below = alpha * sqrt(under) + 1 - alpha;
     *z = below > 0 ? (1 - alpha * alpha * b) / below
-                   : 0; /* 0 / 0 only for alpha = 1 on the rim, at 90 degrees */
+                   : 0; /* avoids 0 / 0, for alpha = 1 on the rim, at 90 degrees */
     return true;
 }
 
@@ -139,7 +139,7 @@ bool camera_lens_unproject(const camera_lens *lens, double px, double py, double
         break;
     case LENS_DIVISION: {
         const double bend = lens->shape[0] * (p[0] * p[0] + p[1] * p[1]);
-        if (bend > 1) /* the same directions again, in reverse */
+        if (bend > 1) /* beyond it the same directions repeat in reverse */
             return false;
         z = 1 + bend;
         break;
@@ -186,7 +186,7 @@ void camera_lens_origin(const camera_lens *lens, double px, double py, double or
     origin_cam[2] = 0;
 }
 
-/* (X, Y) times the returned scale is the distorted point; false where the lens does not see. */
+/* Scale such that (X, Y) times it is the distorted point; false where the lens does not see the point. */
 static bool project_closed(const camera_lens *lens, const double point[3], double *scale)
 {
     const double x = point[0], y = point[1], z = point[2], rho2 = x * x + y * y;
@@ -194,7 +194,8 @@ static bool project_closed(const camera_lens *lens, const double point[3], doubl
         const double k = lens->shape[0], under = z * z - 4 * rho2 * k;
         if (!(under >= 0) || (z <= 0 && (k > 0 || rho2 == 0)))
             return false;
-        /* Behind the camera the usual form cancels; the other root of the same quadratic does not. */
+        /* Behind the camera the usual formula suffers from cancellation; the equivalent form of the same root
+           does not. */
         *scale = z > 0 ? 2 / (z + sqrt(under)) : (z - sqrt(under)) / (2 * rho2 * k);
         return true;
     }
@@ -232,7 +233,7 @@ bool camera_lens_project(const camera_lens *lens, const double point_cam[3], dou
         p[1] = y;
         break;
     case LENS_FISHEYE:
-        if (rho == 0 && z < 0) /* exactly behind: every direction of the image border is equally right */
+        if (rho == 0 && z < 0) /* exactly behind the camera the image direction is undetermined */
             return false;
         scale = rho > 0 ? atan2(rho, z) / rho : 0;
         p[0] = x * scale;

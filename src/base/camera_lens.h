@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_lens.h -- a camera's lens in the form that is quick to evaluate for many pixels. */
+/* base/camera_lens.h -- a camera's lens, prepared for fast evaluation at many pixels. */
 #ifndef GBT_BASE_CAMERA_LENS_H
 #define GBT_BASE_CAMERA_LENS_H
 
@@ -13,11 +13,13 @@ typedef struct camera_lens {
     lens_kind kind;
     double fx, fy, cx, cy;
     double shape[2];    /* FOV: omega; division: k; EUCM: alpha, beta */
-    bool radial, extra; /* is there a radial factor; are there tangential or prism terms */
-    bool extra_last; /* extra terms are taken at the radially distorted point, not at the undistorted one */
+    bool radial, extra; /* whether there is a radial factor; whether there are tangential or prism terms */
+    bool extra_last;    /* extra terms are evaluated at the radially distorted point, not at the undistorted
+                           one */
     double numerator[LENS_NUMERATOR]; /* radial factor N(x) / D(x), x = squared radius, constant term 1 */
     double denominator[LENS_DENOMINATOR];
-    int numerator_count, denominator_count; /* terms up to the last that is not 0, when `radial` or `extra` */
+    int numerator_count, denominator_count; /* number of terms up to the last nonzero one, when `radial` or
+                                               `extra` */
     double tangent_x, tangent_y; /* x += tx (r2 + 2 x x) + 2 ty x y; y += ty (r2 + 2 y y) + 2 tx x y */
     double prism[4];             /* x += s0 r2 + s1 r4; y += s2 r2 + s3 r4 */
     double radius_max;           /* undistorted radius up to which the radial part is increasing */
@@ -33,27 +35,27 @@ typedef struct camera_lens {
  */
 bool camera_lens_prepare(const gbt_camera *camera, camera_lens *lens);
 
-/** As gbt_camera_half_fov_tan(), of a prepared lens and its picture. */
+/** gbt_camera_half_fov_tan() for a prepared lens and its image size. */
 void camera_lens_half_fov_tan(const camera_lens *lens, int width, int height, double tan_half[2]);
 
 /**
- * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or a point of the plane
- * Z = 0 of an orthographic lens.
+ * Where the ray through an image point starts, in camera axes: the centre (0, 0, 0), or for an orthographic
+ * lens a point of the plane Z = 0.
  */
 void camera_lens_origin(const camera_lens *lens, double px, double py, double origin_cam[3]);
 
-/** Do all rays of the lens have Z > 0, whatever its parameters? Such a lens has a plane in focus; others have
+/** Whether all rays of the lens type have Z > 0 for any parameters. Such a lens focuses on a plane, others on
     a sphere. */
 static inline bool camera_lens_looks_forward(const camera_lens *lens)
 {
     return lens->kind == LENS_PERSPECTIVE || lens->kind == LENS_FOV || lens->kind == LENS_ORTHOGRAPHIC;
 }
 
-/** As gbt_camera_unproject() and gbt_camera_project(), same bits. */
+/** gbt_camera_unproject() and gbt_camera_project() for a prepared lens, with the same bits. */
 bool camera_lens_unproject(const camera_lens *lens, double px, double py, double dir_cam[3]);
 
-/** camera_lens_unproject() of the first `count` pixel centres of a row, same bits: dir [count][3], 0 where
-    there is no ray. A distorted lens takes several pixels at a time. */
+/** camera_lens_unproject() for the first `count` pixel centres of a row, with the same bits: dir [count][3],
+    0 where there is no ray. Distorted lenses are inverted for several pixels at a time. */
 void camera_lens_unproject_row(const camera_lens *lens, double py, int count, double *dir);
 
 bool camera_lens_project(const camera_lens *lens, const double point_cam[3], double pixel[2]);

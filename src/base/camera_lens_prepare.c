@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_lens_prepare.c -- a camera's parameters as the lens that they say, and up to which radius it
-   holds. */
+/* base/camera_lens_prepare.c -- make a prepared lens from a camera's parameters, with the radius up to which
+   it is valid. */
 #include <math.h>
 #include <string.h>
 
@@ -16,8 +16,8 @@ static const double perspective_radius_max = 1e6;
 
 enum { SLOPE_COUNT = LENS_NUMERATOR + LENS_DENOMINATOR - 1 };
 
-/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find its first zero,
-   and that of D. */
+/* The distorted radius r f(r^2) has slope f + 2 x f' = (N D + 2 x (N' D - N D')) / D^2: find the first zero
+   of the slope, and of D. */
 static void find_monotone_range(camera_lens *lens, double radius_limit)
 {
     double slope[SLOPE_COUNT] = {0};
@@ -53,7 +53,7 @@ static int term_count(const double *terms, int count)
     return count;
 }
 
-/* The parameters of a camera where its model's row says that they go; false where one is not finite. */
+/* Copy the parameters of a camera into the slots that its model's row names; false if one is not finite. */
 static bool take_params(const gbt_camera *camera, const camera_model *model, camera_lens *lens)
 {
     double *const places[] = {[LENS_FX] = &lens->fx,
@@ -94,8 +94,8 @@ static bool take_params(const gbt_camera *camera, const camera_model *model, cam
     return isfinite(lens->cx) && isfinite(lens->cy);
 }
 
-/* The closed forms: are their shape parameters in the domain? Without distortion they are a pinhole, and then
-   to the same bits. */
+/* Are the shape parameters of the closed-form lenses in their domain? Without distortion such a lens becomes
+   a pinhole, with the same bits. */
 static bool check_shape(camera_lens *lens)
 {
     const double k = lens->shape[0];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_lens_terms.inc.h -- the formulas of a lens's distortion and their derivatives, for a type of
-   number: define NUMBER (double, or a vector of them) and TERMS(name), its functions' names, before each
-   include. */
+/* base/camera_lens_terms.inc.h -- formulas of lens distortion and their derivatives, generic in the number
+   type. Before each include, define NUMBER (double, or a vector of doubles) and TERMS(name), which makes the
+   function names. */
 #include "base/camera_lens.h"
 
 /** Radial factor f(x) = N / D at x = squared radius, and df/dx. */
@@ -26,8 +26,8 @@ static inline __attribute__((always_inline)) NUMBER TERMS(radial)(const camera_l
     return factor;
 }
 
-/** Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is what is missing for the
-    map p + extra(p). */
+/** Tangential and prism terms at (x, y), and I + their Jacobian (row-major), which is the Jacobian of p +
+    extra(p). */
 static inline __attribute__((always_inline)) void TERMS(extra)(const camera_lens *lens, NUMBER x, NUMBER y,
                                                                NUMBER out[2], NUMBER jacobian[4])
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_lens_undistort.c -- inversion of a lens's distortion, several points at a time. */
+/* base/camera_lens_undistort.c -- invert lens distortion by Newton's method, several points at a time. */
 #include "base/camera_lens_undistort.h"
 
 #include <math.h>
@@ -13,12 +13,12 @@
    outside the image. */
 static const double converged_px = 1e-10, converged_relative = 1e-14;
 
-/* 256 bits: GCC takes wider vectors apart value by value where the processor has none. */
+/* 256 bits: GCC splits wider vectors into single values on processors without them. */
 enum { LANES = UNDISTORT_LANES };
 typedef double lanes4 __attribute__((vector_size(32)));
 typedef int64_t mask4 __attribute__((vector_size(32)));
 #define PICK(mask, yes, no) ((lanes4)(((mask) & (mask4)(yes)) | (~(mask) & (mask4)(no))))
-#define INTO static inline __attribute__((always_inline)) /* each clone */
+#define INTO static inline __attribute__((always_inline)) /* inlined into each clone */
 
 #define NUMBER lanes4
 #define TERMS(name) name##_of_lanes
@@ -36,15 +36,16 @@ INTO lanes4 length2(lanes4 x, lanes4 y)
     return out;
 }
 
-/* Accepted distance between a wanted distorted point and the one reached, in units of the plane. */
+/* Accepted distance between the wanted distorted point and the one reached, in units of the image plane at
+   depth 1. */
 INTO lanes4 tolerance_of(const camera_lens *lens, lanes4 radius)
 {
     return converged_px / fmax(lens->fx, lens->fy) + converged_relative * radius;
 }
 
-/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton, kept inside a shrinking
-   bracket. Ends after a step that is at most `enough` of the radius, which 0 never is; then how near it came
-   is not asked. -1 where there is none. */
+/* Solve r f(r^2) = wanted in [0, radius_max], where the left side increases: Newton's method inside a
+   shrinking bracket. With `enough` > 0 it ends after a step of at most `enough` times the radius, without
+   checking the residual. -1 where there is no solution. */
 INTO lanes4 invert_radius(const camera_lens *lens, lanes4 wanted, double enough)
 {
     const lanes4 zero = {0}, most = zero + lens->radius_max;
@@ -69,7 +70,7 @@ INTO lanes4 invert_radius(const camera_lens *lens, lanes4 wanted, double enough)
     return PICK(enough > 0 ? within : within & near, r, zero - 1);
 }
 
-/* True where the radial part alone was undone; elsewhere `p` stays. */
+/* Invert the radial part alone. True where that succeeded; elsewhere `p` is unchanged. */
 INTO mask4 invert_radial(const camera_lens *lens, double enough, lanes4 p[2])
 {
     const lanes4 one = {1, 1, 1, 1}, wanted = length2(p[0], p[1]),
@@ -81,14 +82,14 @@ INTO mask4 invert_radial(const camera_lens *lens, double enough, lanes4 p[2])
     return found;
 }
 
-/* Newton on the 2x2 Jacobian from `p`, each step halved until it comes nearer; ends when rounding stops all
-   progress. True where it came to `wanted`. */
+/* Newton's method with the 2x2 Jacobian, started at `p`; each step is halved until it reduces the residual,
+   and iteration ends when rounding stops all progress. True where it reached `wanted`. */
 INTO mask4 invert_mixed(const camera_lens *lens, const lanes4 wanted[2], lanes4 p[2])
 {
     lanes4 out[2], j[4];
     mixed_of_lanes(lens, p, out, j);
     lanes4 rx = out[0] - wanted[0], ry = out[1] - wanted[1];
-    /* No step comes nearer than this, so none need be halved in search of one. */
+    /* Rounding level of the residual: below it, halving steps cannot improve anything. */
     const lanes4 rounding = 5e-16 * (absolute(wanted[0]) + absolute(wanted[1]));
     mask4 active = absolute(rx) + absolute(ry) > rounding;
     for (int i = 0; i < 50 && any(active); i++) {
@@ -112,7 +113,7 @@ INTO mask4 invert_mixed(const camera_lens *lens, const lanes4 wanted[2], lanes4 
         }
         active &= ~farther & (absolute(rx) + absolute(ry) > rounding);
     }
-    /* Both eigenvalues have a positive real part: the map has not folded over. */
+    /* Both eigenvalues of the Jacobian have a positive real part: the map has not folded over. */
     const mask4 unfolded = (j[0] * j[3] - j[1] * j[2] > 0) & (j[0] + j[3] > 0);
     return unfolded & (length2(rx, ry) <= tolerance_of(lens, length2(wanted[0], wanted[1])));
 }
@@ -128,7 +129,7 @@ FASTEST_CLONE void camera_lens_undistort(const camera_lens *lens, double x[LANES
         const lanes4 wanted[2] = {p[0], p[1]};
         if (lens->radial && !lens->extra_last) {
             const mask4 inside = invert_radial(lens, 1e-3, p);
-            /* The extra terms may reach a little beyond the radial range: start inside it. */
+            /* Extra terms may move the point slightly beyond the radial range, so start inside it. */
             const lanes4 scale = 0.9 * lens->radius_max / length2(wanted[0], wanted[1]);
             p[0] = PICK(inside, p[0], wanted[0] * scale);
             p[1] = PICK(inside, p[1], wanted[1] * scale);

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_model.c -- THE list of camera models: a row here and a number in gbtrace/camera.h is a lens,
-   unless its formula is a new one. */
+/* base/camera_model.c -- the list of camera models. A new model is a row here and a number in
+   gbtrace/camera.h, unless its formula is new. */
 #include "base/camera_model.h"
 
 #include <string.h>
 
-/* COLMAP's, by its numbers. docs/cameras.md has the same list, held by tests/base/test_camera.c. */
+/* COLMAP's models, indexed by its numbers. docs/cameras.md has the same list; tests/base/test_camera.c
+   compares them. */
 static const camera_model models[GBT_CAMERA_MODEL_COUNT] = {
     [GBT_CAMERA_SIMPLE_PINHOLE] =
         {"SIMPLE_PINHOLE", "f cx cy", LENS_PERSPECTIVE, {LENS_F, LENS_CX, LENS_CY}, false},
@@ -72,7 +73,7 @@ static const camera_model models[GBT_CAMERA_MODEL_COUNT] = {
     [GBT_CAMERA_EQUIRECTANGULAR] = {"EQUIRECTANGULAR", "w h", LENS_EQUIRECTANGULAR, {LENS_FX, LENS_FY}},
 };
 
-/* What COLMAP does not have. */
+/* Models that COLMAP does not have. */
 static const camera_model orthographic = {.name = "ORTHOGRAPHIC",
                                           .param_names = "sx sy cx cy",
                                           .kind = LENS_ORTHOGRAPHIC,

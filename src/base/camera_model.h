@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_model.h -- the list of camera models: what each one is called, its parameters, and where the
-   lens pipeline (base/camera_lens.h) takes them. */
+/* base/camera_model.h -- the list of camera models: name and parameters of each, and the slots of the lens
+   pipeline (base/camera_lens.h) that they fill. */
 #ifndef GBT_BASE_CAMERA_MODEL_H
 #define GBT_BASE_CAMERA_MODEL_H
 
@@ -9,7 +9,7 @@
 
 #include "gbtrace/camera.h"
 
-/** How a direction becomes a point of the plane, before distortion. */
+/** How a direction is projected to a point of the plane, before distortion. */
 typedef enum lens_kind {
     LENS_PERSPECTIVE, /* (X / Z, Y / Z), Z > 0 */
     LENS_FISHEYE,     /* (X, Y) scaled to length theta = angle to the axis, theta in [0, pi] */
@@ -20,20 +20,20 @@ typedef enum lens_kind {
     LENS_ORTHOGRAPHIC /* (X, Y), whatever Z > 0 */
 } lens_kind;
 
-/** Where a parameter goes. */
+/** The slot of the lens pipeline that a parameter fills. */
 typedef enum lens_slot {
     LENS_F, /* both focal lengths */
     LENS_FX,
     LENS_FY,
     LENS_CX,
     LENS_CY,
-    LENS_N1, /* radial factor: coefficients of r^2, r^4, ... above the line */
+    LENS_N1, /* radial factor: coefficients of r^2, r^4, ... in the numerator */
     LENS_N2,
     LENS_N3,
     LENS_N4,
     LENS_N5,
     LENS_N6,
-    LENS_D1, /* and below it */
+    LENS_D1, /* and in the denominator */
     LENS_D2,
     LENS_D3,
     LENS_TX, /* tangential */
@@ -42,33 +42,33 @@ typedef enum lens_slot {
     LENS_S1,
     LENS_S2,
     LENS_S3,
-    LENS_SHAPE0, /* of the closed forms: omega; k; alpha */
+    LENS_SHAPE0, /* shape of closed-form lenses: omega; k; alpha */
     LENS_SHAPE1  /* beta */
 } lens_slot;
 
 typedef struct camera_model {
     const char *name;
-    const char *param_names; /* with a space between them */
+    const char *param_names; /* separated by spaces */
     lens_kind kind;
-    lens_slot slots[GBT_CAMERA_MAX_PARAMS]; /* of the parameters, in their order */
-    bool extra_last; /* tangential and prism terms are taken at the radially distorted point */
+    lens_slot slots[GBT_CAMERA_MAX_PARAMS]; /* slot of each parameter, in order */
+    bool extra_last; /* tangential and prism terms are evaluated at the radially distorted point */
 } camera_model;
 
 /** NULL for an unknown model. */
 const camera_model *camera_model_of(gbt_camera_model model);
 
-/** The model of a name of `length` letters; false when there is none. */
+/** Find a model by its name of `length` letters; false when there is none. */
 bool camera_model_find(const char *name, size_t length, gbt_camera_model *out);
 
-/** How many focal lengths stand before the principal point: 1 or 2; 0 for an unknown model. */
+/** Number of focal lengths, which come before the principal point: 1 or 2; 0 for an unknown model. */
 int camera_focal_count(gbt_camera_model model);
 
-/** Where in params the principal point stands: after the focal lengths. Panoramas, which have none in files,
-    have the image point where the whole of them begins at the end, where nobody leaves other models' values.
- */
+/** Index of the principal point in params, after the focal lengths. Panoramas have none in files; the
+    corresponding image point, where the whole panorama begins, is stored in the last two params, where values
+    left over from another model are unlikely. */
 int camera_center_at(gbt_camera_model model);
 
-/** Are there thin prism terms? */
+/** Whether the model has thin prism terms. */
 bool camera_model_has_prism(gbt_camera_model model);
 
 #endif

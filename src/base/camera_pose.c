@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/camera_pose.c -- where a camera stands: from what it looks at, after a small motion, on the way
-   between two poses, and while its image is read out. */
+/* base/camera_pose.c -- poses of a camera: from a look-at target, after a small motion, interpolated between
+   two poses, and during a rolling-shutter read-out. */
 #include "base/camera_pose.h"
 
 #include <math.h>
@@ -110,7 +110,7 @@ void camera_motion_at(const camera_motion *motion, double t, double rotation[9],
         center[i] = motion->start_center[i] + t * motion->way[i];
 }
 
-/* `part` of a motion, of a pose: centre + R^T v and exp(omega)^T R. */
+/* Apply the fraction `part` of a motion to a pose: centre + R^T v and exp(omega)^T R. */
 static void move(const double motion[6], double part, double rotation[9], double center[3])
 {
     double step[3], axis[3] = {motion[3], motion[4], motion[5]}, back[9], moved[9];
@@ -180,7 +180,10 @@ bool camera_pose_pixel(const camera_pose *pose, const camera_lens *lens, const d
 
 bool camera_pixel(const gbt_camera *camera, const camera_lens *lens, const double point[3], double pixel[2])
 {
-    enum { STEPS_MAX = 50 }; /* each leaves the share of the image's height that the motion moves a point */
+    enum {
+        STEPS_MAX = 50
+    }; /* each multiplies the error by the share of the image's height that a point
+          moves by during read-out */
     camera_pose pose = camera_pose_during(camera, 0.5);
     if (!camera_pose_pixel(&pose, lens, point, pixel))
         return false;
@@ -214,7 +217,8 @@ gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double w
     const camera_pose middle = camera_pose_during(camera, first + 0.5 * span);
     double way[3];
     stand_at(&middle, &out);
-    dmat_apply_transposed(camera->rotation, camera->motion, way); /* a line in the world */
+    dmat_apply_transposed(camera->rotation, camera->motion, way); /* the path is a straight line in the
+                                                                     world */
     dmat_apply(out.rotation, way, out.motion);
     for (int i = 0; i < 6; i++)
         out.motion[i] *= span;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/choice.c -- names of closed sets. */
+/* base/choice.c -- look up, print and check the names of enumerations. */
 #include "base/choice.h"
 
 #include <stdio.h>

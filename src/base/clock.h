@@ -12,7 +12,7 @@ static inline double clock_seconds_of(clockid_t clock)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/** Wall time since some fixed moment; never runs backwards. */
+/** Wall time since an arbitrary fixed moment; monotonic. */
 static inline double clock_wall(void) { return clock_seconds_of(CLOCK_MONOTONIC); }
 
 /** Processor time of all threads of this process. */

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/compare.h -- the smaller and the larger of two; orders for qsort(). */
+/* base/compare.h -- minimum and maximum of two numbers, and comparison functions for qsort(). */
 #ifndef GBT_BASE_COMPARE_H
 #define GBT_BASE_COMPARE_H
 
 #include <math.h>
 #include <stddef.h>
 
-/** As fmaxf() and fminf() of numbers, but not calls. */
+/** fmaxf() and fminf() for arguments that are not NaN, inlined. */
 static inline float larger(float a, float b) { return a > b ? a : b; }
 static inline float smaller(float a, float b) { return a < b ? a : b; }
 
-/** The larger, or the smaller, of the two; NaN when one of them is. */
+/** Maximum and minimum; NaN when either argument is NaN. */
 static inline double larger_or_nan(double a, double b) { return b > a || isnan(b) ? b : a; }
 static inline double smaller_or_nan(double a, double b) { return b < a || isnan(b) ? b : a; }
 

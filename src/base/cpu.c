@@ -15,7 +15,7 @@ bool cpu_has_isa(cpu_isa isa)
 {
 #if defined(__x86_64__)
     __builtin_cpu_init();
-#ifdef __clang__ /* does not know the name f16c; no processor has AVX2 without it */
+#ifdef __clang__ /* clang does not know the name f16c; every processor with AVX2 has it */
     const bool halves = true;
 #else
     const bool halves = __builtin_cpu_supports("f16c");
@@ -32,7 +32,7 @@ bool cpu_has_isa(cpu_isa isa)
 #endif
 }
 
-/* The widest that is there and no wider than `isa`. */
+/* The widest available instruction set that is not wider than `isa`. */
 static cpu_isa within(cpu_isa isa)
 {
     while (!cpu_has_isa(isa))

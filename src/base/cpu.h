@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/cpu.h -- which vector instructions the kernels use: the widest this processor has, or what GBT_ISA
-   says. */
+/* base/cpu.h -- which vector instructions the kernels use: the widest that this processor has, limited by
+   GBT_ISA. */
 #ifndef GBT_BASE_CPU_H
 #define GBT_BASE_CPU_H
 
 #include <stdbool.h>
 #include <stddef.h>
 
-/** From the narrowest to the widest. NEON is there on every 64-bit ARM, AVX2 and AVX-512 on x86-64 only. */
+/** From the narrowest to the widest. Every 64-bit ARM processor has NEON; AVX2 and AVX-512 exist on x86-64
+    only. */
 typedef enum cpu_isa { CPU_PLAIN, CPU_NEON, CPU_AVX2, CPU_AVX512, CPU_ISA_COUNT } cpu_isa;
 
 /* For a kernel that is compiled once per instruction set as NAME_plain, NAME_avx2, ... (gbt_kernels in
    CMakeLists.txt): CPU_DECLARE_VARIANTS declares them, CPU_VARIANT points to the one for `isa`. CPU_CLONE
-   does so where one C source is compiled with several options, which on ARM are the compiler's own. */
+   does so for one C source that is compiled with several compiler options; on ARM there is only the
+   default. */
 #if defined(__x86_64__)
 #define CPU_DECLARE_VARIANTS(type, name) extern const type name##_plain, name##_avx2, name##_avx512
 #define CPU_VARIANT(name, isa)                                                                               \

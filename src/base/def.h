@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/def.h -- the mark of a def that its default function made. */
+/* base/def.h -- the cookie that marks a definition struct made by its _default() function. */
 #ifndef GBT_BASE_DEF_H
 #define GBT_BASE_DEF_H
 
@@ -7,10 +7,12 @@
 
 #include "base/fail.h"
 
-/* Another one whenever a public def changes: a program that was compiled with other headers is refused. */
+/* It changes whenever a public definition struct changes, so that programs compiled with other headers are
+   refused. */
 enum { DEF_COOKIE = 0x67627433 };
 
-/** GBT_OK, or GBT_ERR_ARGUMENT: a zeroed def has no defaults. */
+/** GBT_OK, or GBT_ERR_ARGUMENT for a struct that did not come from its _default() function, such as a zeroed
+    one. */
 static inline gbt_status def_check(uint32_t cookie, const char *maker, gbt_error *err)
 {
     return cookie == DEF_COOKIE

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/fail.c -- write and forward gbt_status. */
+/* base/fail.c -- write errors. */
 #include "base/fail.h"
 
 #include <stdarg.h>
@@ -12,7 +12,7 @@ gbt_status base_fail(gbt_error *err, gbt_status status, const char *format, ...)
         va_start(args, format);
         vsnprintf(err->text, sizeof err->text, format, args);
         va_end(args);
-        /* File names come from users: a newline in one must not break the promise of one line. */
+        /* A newline in a user's file name must not break the guarantee of one line. */
         for (char *c = err->text; *c != '\0'; c++)
             if ((unsigned char)*c < 0x20)
                 *c = '?';

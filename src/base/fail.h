@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/fail.h -- write and forward gbt_status. */
+/* base/fail.h -- write errors and forward gbt_status. */
 #ifndef GBT_BASE_FAIL_H
 #define GBT_BASE_FAIL_H
 

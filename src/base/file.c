@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/file.c -- files read whole or in part; folders, locks and paths. */
+/* base/file.c -- read files, whole or in part; folders, locks and paths. */
 #include "base/file.h"
 
 #include <ctype.h>
@@ -25,8 +25,8 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
 {
     *bytes = NULL;
     *byte_count = 0;
-    const int fd =
-        open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a FIFO without a writer must not hang us */
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* O_NONBLOCK: opening a FIFO without a
+                                                                     writer must not hang */
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot open: %s", path, strerror(errno));
     gbt_status status = GBT_OK;
@@ -114,7 +114,7 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
     return status;
 }
 
-/* Where a path is: of "a/b" and of "a/": "a". */
+/* The folder of a path: "a" for both "a/b" and "a/". */
 static void folder_of(const char *path, char folder[PATH_LIMIT])
 {
     const char *slash = strrchr(path, '/');
@@ -124,11 +124,11 @@ static void folder_of(const char *path, char folder[PATH_LIMIT])
         snprintf(folder, PATH_LIMIT, "%.*s", (int)(slash == path ? 1 : slash - path), path);
 }
 
-/* Can `folder` hold what `path` names? */
+/* Can `path` be created in `folder`? */
 static gbt_status check_folder(const char *folder, const char *path, gbt_error *err)
 {
     char inside[PATH_LIMIT];
-    GBT_TRY(file_join(inside, sizeof inside, folder, ".", err)); /* a file has no such entry */
+    GBT_TRY(file_join(inside, sizeof inside, folder, ".", err)); /* fails if `folder` is a file */
     return access(inside, W_OK | X_OK) == 0
                ? GBT_OK
                : base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));

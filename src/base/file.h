@@ -21,15 +21,15 @@ gbt_status file_read(const char *path, unsigned char **bytes, size_t *byte_count
  */
 size_t file_read_at(int fd, uint64_t at, void *out, size_t count, int *failure);
 
-/** The same where all of them must be there: GBT_ERR_IO, with `path`, the place and the reason, if not. */
+/** The same, but all bytes must be read: otherwise GBT_ERR_IO, with `path`, the offset and the reason. */
 gbt_status file_read_all_at(int fd, uint64_t at, void *out, size_t count, const char *path, gbt_error *err);
 
 /**
- * What tells one file from another at little cost: its size as 8 bytes, then its first and its last `count`
- * bytes (all of it when it has fewer than 2 * count).
+ * A cheap fingerprint of a file: its size as 8 bytes, then its first and its last `count` bytes (the whole
+ * file when it has fewer than 2 * count).
  *
  * @param out [out] 2 * count + 8 bytes
- * @param used [out] how many are used; 0 for what is no regular file
+ * @param used [out] number of bytes used; 0 if it is not a regular file
  * @return GBT_OK; GBT_ERR_IO: it cannot be opened or read
  */
 gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, size_t *used, gbt_error *err);
@@ -37,35 +37,35 @@ gbt_status file_read_ends(const char *path, size_t count, unsigned char *out, si
 /**
  * Replace a file atomically: temporary name in the same folder, write, fsync, rename, fsync of the folder.
  *
- * After any failure, kill or full disk the old file is whole and no temporary file is left by a failure that
- * we see. A device, a pipe or /dev/stdout is written to as it is. Who may read and write the file stays as it
- * was, but that its owner may write it; a link is replaced, and what it leads to stays.
+ * After any failure, kill or full disk the old file is intact; after a failure that the function sees, no
+ * temporary file is left. A device, a pipe or /dev/stdout is written to directly. Permissions of the old file
+ * are kept, with write permission for the owner added. A symbolic link is replaced; its target stays.
  */
 gbt_status file_write_atomic(const char *path, const void *bytes, size_t byte_count, gbt_error *err);
 
-/** Before the process ends while other threads are at work: files that file_write_atomic() writes are brought
-   to their end, for at most five seconds, and it begins no other. */
+/** Call before the process ends while other threads are working: waits, at most five seconds, for running
+    file_write_atomic() calls to finish, and prevents new ones. */
 void file_writes_end(void);
 
-/** Before work whose result goes there: GBT_ERR_IO when a file cannot be created or replaced, because its
-    folder is not there or cannot be written, or it is a folder itself. Nothing is written. */
+/** Check, before the work whose result it will hold, that a file can be created or replaced: GBT_ERR_IO when
+    its folder is missing or not writable, or the path is a folder. Nothing is written. */
 gbt_status file_check_creatable(const char *path, gbt_error *err);
 
-/** The same for file_make_folder() and what goes into the folder. */
+/** The same for file_make_folder() and files in that folder. */
 gbt_status file_check_folder_creatable(const char *path, gbt_error *err);
 
-/** fsync of the folder that `path` is in, as far as its file system knows that. */
+/** fsync the folder of `path`, if its file system supports that. */
 void file_sync_folder_of(const char *path);
 
 /** Create a folder and its parents; an existing folder is fine. */
 gbt_status file_make_folder(const char *path, gbt_error *err);
 
 /**
- * Hold a folder against other processes that hold it by this function, until file_unlock_folder() or the end
- * of the process, however it ends. Nothing is written. Where a file system knows no locks this does nothing.
+ * Lock a folder against other callers of this function, until file_unlock_folder() or the end of the process,
+ * however it ends. Nothing is written. On file systems without locks this does nothing.
  *
  * @param lock [out] for file_unlock_folder(); unchanged after a failure
- * @return GBT_OK; GBT_ERR_IO: somebody else holds it, or it cannot be opened
+ * @return GBT_OK; GBT_ERR_IO when the folder is already locked or cannot be opened
  */
 gbt_status file_lock_folder(const char *path, int *lock, gbt_error *err);
 
@@ -73,36 +73,36 @@ void file_unlock_folder(int lock);
 
 struct stat;
 
-/** stat(), where a failed look-up is no absence: GBT_ERR_IO when it cannot be told whether the path exists.
-    `out` is set when it does. */
+/** stat() that distinguishes a missing file from a failed look-up: GBT_ERR_IO when existence cannot be
+    determined. `out` is set if the path exists. */
 gbt_status file_stat(const char *path, struct stat *out, bool *exists, gbt_error *err);
 
 typedef enum file_kind { FILE_NONE, FILE_FOLDER, FILE_OTHER } file_kind;
 
-/** Devices, pipes and names of open files (/dev/stdout): they are written to as they are, for a file renamed
-   to /dev/null would take its place. */
+/** Whether a path is a device, a pipe or an open file (/dev/stdout). These are written to directly; replacing
+    /dev/null by renaming a file would destroy it. */
 bool file_is_stream(const char *path);
 
-/** What is at a path; errors as of file_stat(). */
+/** The kind of entry at a path; errors as in file_stat(). */
 gbt_status file_look(const char *path, file_kind *out, gbt_error *err);
 
-/** Also what cannot be told: who opens it then says why. */
+/** Whether a path exists; also true when that cannot be determined, so that opening it reports the reason. */
 bool file_exists(const char *path);
 bool file_is_folder(const char *path);
 
-/** Whether both are there, and are one file or folder, whatever they are called. */
+/** Whether both paths exist and are the same file or folder, under whatever names. */
 bool file_is_same(const char *a, const char *b);
 
-/** Bytes of the UTF-8 byte order mark that a text of `count` bytes begins with: 3 or 0. */
+/** Size of a UTF-8 byte order mark at the start of a text of `count` bytes: 3 or 0. */
 size_t file_mark_bytes(const void *text, size_t count);
 
-/** Whether both name one file: the same path, or one file that is there. */
+/** Whether both name the same file: equal paths, or the same existing file. */
 bool file_is_one(const char *a, const char *b);
 
-/** The largest N of the entries PREFIXN of a folder, N in decimal digits: false when there is none. */
+/** The largest N of the entries PREFIX<N> in a folder, with N in decimal digits; false when there is none. */
 bool file_largest_number(const char *folder, const char *prefix, unsigned long *out);
 
-/** Whether more stands before `ending` (".ply", in either case) at the end of a path. */
+/** Whether a path ends with `ending` (".ply", ignoring case) and has more before it. */
 bool file_ends_with(const char *path, const char *ending);
 
 /** "folder/name" in a buffer of `size` bytes; GBT_ERR_ARGUMENT when it does not fit. */

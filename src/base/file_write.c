@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/file_write.c -- a whole file at once. */
+/* base/file_write.c -- write a whole file atomically. */
 #include "base/file.h"
 
 #include <poll.h>

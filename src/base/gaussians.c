@@ -15,8 +15,8 @@ static size_t padded(size_t count)
 gbt_status gaussians_resize(gaussians *g, size_t count, gbt_error *err)
 {
     if (padded(count) > g->capacity || g->mean_x == NULL) {
-        /* One block for all fields: one owner, one free. Grown by an eighth, because the count wanders from
-           view to view. */
+        /* One allocation for all fields, with an eighth of spare room because the count varies from view to
+           view. */
         const size_t capacity = padded(count + count / 8 + 1);
         float *block = mem_alloc(capacity, GAUSSIANS_FIELD_COUNT * sizeof *block, "gaussians", err);
         if (block == NULL)

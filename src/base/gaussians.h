@@ -3,8 +3,8 @@
    gradients.
 
    One float array per field, 64-byte aligned, padded to GAUSSIANS_LANES with Gaussians of opacity 0, so that
-   kernels run whole vectors and the padding adds exactly nothing. The same struct with the same fields holds
-   the gradient dL/dfield. */
+   kernels process whole vectors and the padding contributes exactly nothing. The same struct with the same
+   fields holds the gradient dL/dfield. */
 #ifndef GBT_BASE_GAUSSIANS_H
 #define GBT_BASE_GAUSSIANS_H
 
@@ -48,10 +48,10 @@ void gaussians_pad(gaussians *g);
 /** All fields to 0, padding included: the state in which gradients start. */
 void gaussians_zero(gaussians *g);
 
-/** The padding alone. */
+/** Set only the padding to 0. */
 void gaussians_zero_padding(gaussians *g);
 
-/** All fields of [begin, end) of `g` to the same places of `out`, which has room for them. */
+/** Copy all fields of [begin, end) of `g` to the same indices of `out`, which has room for them. */
 void gaussians_copy_range(const gaussians *g, size_t begin, size_t end, gaussians *out);
 
 /** `out` becomes a copy of `g`, padded. `out` as for gaussians_resize(); not `g`. */

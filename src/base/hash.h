@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/hash.h -- FNV-1a of bytes: tells apart, protects against nobody. */
+/* base/hash.h -- FNV-1a hash of bytes: distinguishes data, not cryptographic. */
 #ifndef GBT_BASE_HASH_H
 #define GBT_BASE_HASH_H
 
@@ -8,7 +8,7 @@
 
 #define HASH_START UINT64_C(0xcbf29ce484222325)
 
-/** Goes on from `hash`, first HASH_START. */
+/** Continue from `hash`; start with HASH_START. */
 static inline uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t count)
 {
     const unsigned char *at = bytes;

@@ -23,20 +23,20 @@ typedef struct image {
 gbt_status image_alloc(image *out, int width, int height, int channels, gbt_error *err);
 void image_free(image *im); /* zeroes the struct */
 
-/** Whether it has a fourth channel, alpha, that is below 1 somewhere. */
+/** Whether it has an alpha channel (the fourth) with a value below 1. */
 bool image_is_transparent(const image *im);
 
-/** Make `im` of that size, unless it is: what it held is lost then. Start from {0}. */
+/** Resize `im` unless it has this size already; its contents are then lost. Start from {0}. */
 gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *err);
 
 /**
  * Read a PNG, JPEG or EXR file.
  *
- * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel, and the colours
- * as the file has them: times alpha in an EXR, not so in a PNG. The format is taken from the file's magic,
- * not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, EXR that is deep,
- * cropped or of several parts or has colours in layers alone, and images of more than 2^29 samples are
- * refused. Float values that are not finite become 0, with one warning.
+ * 8- and 16-bit integers become [0, 1]; grey becomes RGB; alpha is kept as a fourth channel, and colours stay
+ * as in the file: premultiplied by alpha in an EXR, not premultiplied in a PNG. The format is taken from the
+ * file's magic, not its name. Orientation tags are not applied (COLMAP's choice). Truncated files, images of
+ * more than 2^29 samples, and EXR files that are deep, cropped, multi-part or have colours only in layers are
+ * refused. Non-finite float values become 0, with one warning.
  *
  * @param out [out] 3 or 4 channels; free with image_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot open), GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
@@ -45,7 +45,7 @@ gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *
 gbt_status image_read(const char *path, image *out, gbt_error *err);
 
 /**
- * image_read(), and where it replaced values that are not finite by 0.
+ * image_read() with a mask of the pixels whose non-finite values it replaced by 0.
  *
  * @param valid [out] may be NULL; `*valid` is NULL when every value is finite, else [height][width]: 0 for
  *                    pixels with a value that is not; free with mem_free()
@@ -59,8 +59,7 @@ typedef struct image_names {
 } image_names;
 
 /**
- * Read every channel of a 32-bit float EXR as it is: values that are not finite too, nothing scaled or
- * multiplied.
+ * Read every channel of a 32-bit float EXR unchanged, including non-finite values, without scaling.
  *
  * Channels come in OpenImageIO's order: R, G, B, A first, the rest as in the file.
  *
@@ -71,13 +70,13 @@ typedef struct image_names {
  */
 gbt_status image_read_raw(const char *path, image *out, image_names *names, gbt_error *err);
 
-/** What EXIF of a JPEG says of the camera that took a photo; that of a PNG is not read. */
+/** EXIF data of a JPEG about the camera; EXIF in PNG files is not read. */
 typedef struct image_lens {
-    char camera[128]; /* make and model; empty when it says nothing */
+    char camera[128]; /* make and model; empty when unknown */
     float focal;      /* millimetres; 0: unknown */
 } image_lens;
 
-/** Reads the whole file and decodes no pixel. Errors as of image_read(). */
+/** Reads the whole file but decodes no pixels. Errors as in image_read(). */
 gbt_status image_lens_read(const char *path, image_lens *out, gbt_error *err);
 
 /**
@@ -88,12 +87,12 @@ gbt_status image_write(const char *path, const image *im, gbt_error *err);
 
 enum { IMAGE_AS_PNG = 0 };
 
-/** A file in memory: a JPEG of that quality, [1, 100], or the PNG of image_write(). Free `*bytes` with
-    mem_free(). */
+/** Encode an image file in memory: a JPEG of `quality`, [1, 100], or the PNG of image_write(). Free `*bytes`
+    with mem_free(). */
 gbt_status image_encode(const image *im, int quality, unsigned char **bytes, size_t *byte_count,
                         gbt_error *err);
 
-/** Name and version of the library behind these, as it runs: "OpenImageIO 2.4.7". Static. */
+/** Name and version of the loaded image library: "OpenImageIO 2.4.7". Static. */
 const char *image_library(void);
 
 #ifdef __cplusplus

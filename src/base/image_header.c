@@ -14,13 +14,14 @@
 #include "base/file.h"
 
 enum {
-    HEADER_PARTS_MAX = 10000, /* markers, attributes, or chunks before the pixels, that are looked at */
+    HEADER_PARTS_MAX = 10000, /* maximum number of markers, attributes, or chunks before the pixels that are
+                                 parsed */
     PNG_CHUNKS_MAX = 1 << 20,
-    SCAN_BYTES = 1 << 16, /* read at once when the end of a JPEG is looked for */
+    SCAN_BYTES = 1 << 16, /* size of a read when searching for the end of a JPEG */
     EXR_NAME_MAX = 256
 };
 
-/* An open file of known size. Reads outside of it, or that fail, give zeros and set `is_short`. */
+/* An open file of known size. Reads outside it, or failing ones, give zeros and set `is_short`. */
 typedef struct reader {
     const char *path;
     int fd;
@@ -105,7 +106,7 @@ static int exif_orientation(const unsigned char *tiff, size_t count)
 
 static int read_exif(reader *r, uint64_t at, uint64_t size)
 {
-    unsigned char tiff[4096]; /* the first directory stands at its start */
+    unsigned char tiff[4096]; /* the first directory is at the start */
     const size_t count = size < sizeof tiff ? (size_t)size : sizeof tiff;
     take(r, at, tiff, count);
     return r->is_short ? 1 : exif_orientation(tiff, count);
@@ -152,7 +153,8 @@ static gbt_status read_png(reader *r, image_header *out)
 
 /* ---- JPEG ---- */
 
-/* Whether the end marker comes behind byte `from`: looked for from the end, where it nearly always is. */
+/* Whether there is an end marker after byte `from`. The search runs backwards, because the marker is nearly
+   always at the end. */
 static bool jpeg_ends(reader *r, uint64_t from)
 {
     unsigned char part[SCAN_BYTES + 1];
@@ -163,7 +165,7 @@ static bool jpeg_ends(reader *r, uint64_t from)
         for (size_t i = count; i-- > 1;)
             if (part[i] == 0xd9 && part[i - 1] == 0xff)
                 return true;
-        end = begin == from ? from : begin + 1; /* a marker may lie across two parts */
+        end = begin == from ? from : begin + 1; /* a marker may be split between two reads */
     }
     return false;
 }
@@ -175,7 +177,8 @@ static gbt_status read_jpeg(reader *r, image_header *out)
     bool has_size = false;
     for (int i = 0; i < HEADER_PARTS_MAX; i++) {
         take(r, at, head, sizeof head);
-        while (!r->is_short && head[0] == 0xff && head[1] == 0xff) /* a marker may be filled up by 0xff */
+        while (!r->is_short && head[0] == 0xff && head[1] == 0xff) /* a marker may be preceded by fill bytes
+                                                                      0xff */
             take(r, ++at, head, sizeof head);
         if (r->is_short)
             break;
@@ -215,7 +218,7 @@ static gbt_status read_jpeg(reader *r, image_header *out)
 
 /* ---- EXR ---- */
 
-/* A text that ends by a zero byte; false when it is longer than an EXR allows. */
+/* Read a zero-terminated string; false when it is longer than an EXR allows. */
 static bool take_name(reader *r, uint64_t *at, char out[EXR_NAME_MAX])
 {
     size_t count = EXR_NAME_MAX;
@@ -229,7 +232,8 @@ static bool take_name(reader *r, uint64_t *at, char out[EXR_NAME_MAX])
     return !r->is_short;
 }
 
-/* Channel names of a chlist attribute: how many, and which are colours or alpha, as OpenImageIO has it. */
+/* Parse a chlist attribute: returns the number of channels, and finds colours and alpha by OpenImageIO's
+   rules. */
 static int64_t exr_channels(reader *r, uint64_t at, uint64_t end, image_header *out)
 {
     char name[EXR_NAME_MAX];
@@ -289,7 +293,7 @@ static gbt_status read_exr(reader *r, image_header *out)
             r->path);
     if (channels < 1)
         return base_fail(r->err, GBT_ERR_FORMAT, "%s: EXR has no channels", r->path);
-    return at + 8 < r->size ? GBT_OK : truncated(r, "EXR"); /* at least one offset and something behind it */
+    return at + 8 < r->size ? GBT_OK : truncated(r, "EXR"); /* at least one offset and some data after it */
 }
 
 /* ---- entries ---- */
@@ -344,7 +348,7 @@ gbt_status image_header_read(const char *path, image_header *out, gbt_error *err
         } else {
             status = refuse_format(&r, magic);
         }
-        if (r.failure != 0) /* whatever the zeros in its place looked like */
+        if (r.failure != 0) /* a read failure takes precedence over errors caused by the zeros in its place */
             status = base_fail(err, GBT_ERR_IO, "%s: read failed: %s", path, strerror(r.failure));
     }
     close(r.fd);

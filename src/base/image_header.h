@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/image_header.h -- what the first bytes of a PNG, JPEG or EXR file say, without its pixels and without
-   the libraries that decode them. */
+/* base/image_header.h -- read the headers of PNG, JPEG and EXR files, without decoding pixels and without
+   image libraries. */
 #ifndef GBT_BASE_IMAGE_HEADER_H
 #define GBT_BASE_IMAGE_HEADER_H
 
@@ -14,10 +14,10 @@ extern "C" {
 
 typedef enum image_kind { IMAGE_PNG, IMAGE_JPEG, IMAGE_EXR } image_kind;
 
-/** Largest width * height * channels that is read. */
+/** Largest accepted width * height * channels. */
 #define IMAGE_SAMPLES_MAX (INT64_C(1) << 29)
 
-/** The same for people. */
+/** The same in megapixels, for messages. */
 #define IMAGE_MEGAPIXELS_MAX(channels) (1e-6 * (double)IMAGE_SAMPLES_MAX / ((channels) > 1 ? (channels) : 1))
 
 typedef struct image_header {
@@ -29,10 +29,10 @@ typedef struct image_header {
 } image_header;
 
 /**
- * Read the header of an image file, and see that the file goes on to its end: PNG by the lengths of its
+ * Read the header of an image file, and check that the file is not truncated: PNG by the lengths of its
  * chunks, JPEG by its end marker, EXR by its table of offsets.
  *
- * Whatever this refuses image_read() refuses; pixels may be damaged all the same.
+ * Everything that this refuses is also refused by image_read(); pixel data may still be damaged.
  *
  * @return GBT_OK, GBT_ERR_IO (not a file, cannot be read), GBT_ERR_FORMAT (another format, truncated, an
  * image of no pixels or of more than IMAGE_SAMPLES_MAX samples, an EXR that is cropped) Threads: any. Cost: a
@@ -40,7 +40,7 @@ typedef struct image_header {
  */
 gbt_status image_header_read(const char *path, image_header *out, gbt_error *err);
 
-/** GBT_ERR_FORMAT, in the words of image_read(), for the header of a file without colours. */
+/** GBT_ERR_FORMAT, with the message of image_read(), if the header is of a file without colours. */
 gbt_status image_header_colors(const char *path, const image_header *header, gbt_error *err);
 
 #ifdef __cplusplus

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/large_file.c -- files written and read piece by piece; how every file is replaced atomically. */
+/* base/large_file.c -- files written and read in pieces, and the atomic replacement of files. */
 #include "base/large_file.h"
 
 #include <errno.h>
@@ -53,7 +53,8 @@ gbt_status large_file_create(const char *path, large_file *out, gbt_error *err)
                           : open(out->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (fd < 0)
         return base_fail(err, GBT_ERR_IO, "%s: cannot create: %s", path, strerror(errno));
-    if (!stream && stat(path, &old) == 0) /* private stays private; who appends next, as to log.csv, can */
+    if (!stream && stat(path, &old) == 0) /* keep the permissions of the old file, with write permission for
+                                             the owner, who may append later, as to log.csv */
         fchmod(fd, (old.st_mode & 0777) | S_IWUSR);
     out->open = true;
     out->descriptor = fd;

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/library_end.h -- libraries that end the process themselves when they have no memory. */
+/* base/library_end.h -- libraries that end the process themselves when memory runs out. */
 #ifndef GBT_BASE_LIBRARY_END_H
 #define GBT_BASE_LIBRARY_END_H
 
 #include <stdbool.h>
 
-/** While `on`, exit() on this thread means that memory ran out: gbt_when_out_of_memory() answers. */
+/** While `on`, a call of exit() on this thread is taken to mean that memory ran out, and the handler of
+    gbt_when_out_of_memory() is called. */
 void library_exit_is_failure(bool on);
 
 #endif

@@ -17,10 +17,11 @@ enum { LINE_SIZE = 1024 };
 
 static const double often_seconds = 0.5, line_seconds = 10;
 
-static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* of all statics; lines of two threads never mix */
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER; /* protects all statics, and keeps lines of different
+                                                            threads apart */
 static gbt_listener listener;
 static void *listener_context;
-static bool line_is_open; /* progress stands at the end of the terminal, without a newline */
+static bool line_is_open; /* the last line on the terminal is progress, without a newline */
 
 void gbt_listen(gbt_listener to, void *context)
 {
@@ -30,14 +31,14 @@ void gbt_listen(gbt_listener to, void *context)
     pthread_mutex_unlock(&lock);
 }
 
-/* Where a line can be written over. */
+/* Whether stderr is a terminal, on which a line can be overwritten. */
 static bool on_terminal(void)
 {
     const char *kind = getenv("TERM");
     return isatty(STDERR_FILENO) && kind != NULL && strcmp(kind, "dumb") != 0;
 }
 
-/* A line that wraps cannot be written over. */
+/* Width at which progress is cut, because a wrapped line cannot be overwritten. */
 static int terminal_width(void)
 {
     struct winsize size;
@@ -48,8 +49,8 @@ static void print_event(const gbt_event *e)
 {
     const bool over = e->kind == GBT_EVENT_PROGRESS && on_terminal();
     if (over)
-        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* to the end of the line: the one before
-                                                                       may have been longer */
+        fprintf(stderr, "\r%.*s\033[K", terminal_width(), e->text); /* clear to the end of the line, since the
+                                                                       previous one may have been longer */
     else
         fprintf(stderr, "%s%s%s\n", line_is_open ? "\n" : "", e->kind == GBT_EVENT_WARNING ? "warning: " : "",
                 e->text);
@@ -92,7 +93,7 @@ void log_info(const char *format, ...)
     va_end(args);
 }
 
-/* Under the lock. */
+/* Call with the lock held. */
 static bool is_due(void)
 {
     static double last = -1;
@@ -134,7 +135,8 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
     }
     current.done = done;
     const double seconds = clock_wall() - current.start;
-    /* A person is told in other words when a stage ends, and nothing of what is not yet done. */
+    /* Without a listener nothing is printed at done = 0, and the end of a stage only completes an open
+       progress line: its end has a message of its own. */
     const bool tells =
         ((done > 0 || listener != NULL) && is_due()) || (done == total && (listener != NULL || line_is_open));
     pthread_mutex_unlock(&lock);

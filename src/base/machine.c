@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/machine.c -- /proc and control groups to the few numbers that matter here. */
+/* base/machine.c -- read processor and memory limits from /proc and control groups. */
 #include "base/machine.h"
 
 #include <math.h>
@@ -58,7 +58,7 @@ static void limit_memory(machine *m, const char *text)
         m->memory_limit_bytes = smaller_size(m->memory_limit_bytes, (size_t)bytes);
 }
 
-/* Limits of `group` ("/a/b") and of all that it is in, under `mount`. */
+/* Apply the limits of `group` ("/a/b") and of all its parent groups, under `mount`. */
 static void read_groups(machine *m, const char *root, const char *mount, char *group)
 {
     char folder[PATH_SIZE], line[LINE_SIZE], period[LINE_SIZE];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/memory.c -- checked, aligned allocation with a failure switch. */
+/* base/memory.c -- checked, aligned allocation with injected failures for tests. */
 #include "base/memory.h"
 
 #include <stdatomic.h>
@@ -29,7 +29,8 @@ static int must_fail(void)
 
 void mem_fail_after(long n) { atomic_store(&fail_countdown, n < 0 ? -1 : n); }
 
-/* As mem_alloc(). A fresh file is zero; `zero` NULL: never from a file. */
+/* mem_alloc() with a report whether the memory is zero, as in a fresh file mapping; `zero` NULL: never use a
+   file. */
 static void *take(size_t count, size_t size, const char *what, bool *zero, gbt_error *err)
 {
     size_t bytes;
@@ -49,14 +50,14 @@ static void *take(size_t count, size_t size, const char *what, bool *zero, gbt_e
         *zero = pointer != NULL;
     if (pointer != NULL)
         return pointer;
-    /* Large arrays ask for large pages: a tree is walked in no order, and misses of the address cache cost as
-       much as misses of the data. */
+    /* Request huge pages for large arrays: trees are accessed in random order, where TLB misses cost as much
+       as cache misses. */
     const bool large = bytes >= 4 * LARGE_PAGE;
     if (!fails)
         pointer = aligned_alloc(large ? LARGE_PAGE : MEM_ALIGN,
                                 large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : bytes);
     if (pointer != NULL && large)
-        madvise(pointer, bytes, MADV_HUGEPAGE); /* a wish */
+        madvise(pointer, bytes, MADV_HUGEPAGE); /* only a hint */
     if (pointer == NULL)
         base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for %zu bytes", what, bytes);
     return pointer;
@@ -79,7 +80,8 @@ void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err)
 
 gbt_status mem_check(size_t count, size_t size, const char *what, gbt_error *err)
 {
-    void *volatile room = take(count, size, what, NULL, err); /* or the compiler would leave both out */
+    void *volatile room = take(count, size, what, NULL, err); /* volatile: otherwise the compiler would remove
+                                                                 both calls */
     free(room);
     return room != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
@@ -133,8 +135,8 @@ void mem_free(void *pointer)
         free(pointer);
 }
 
-/* Not ru_maxrss where VmHWM is there: it holds what the program took that this one was started in place of.
- */
+/* VmHWM is preferred to ru_maxrss, which includes the memory of the program that this process ran before
+   exec(). */
 size_t mem_peak_bytes(void)
 {
     char line[128];

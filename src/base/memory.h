@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, a failure switch for tests, a count
-   of bytes in use.
+/* base/memory.h -- the only allocator: checked sizes, 64-byte alignment, injected failures for tests, peak
+   memory.
 
-   Every array of the library is owned by the object that allocated it here and is freed with mem_free().
-   Below a limit large ones are in files (base/paged.h). */
+   Every array of the library is owned by the object that allocated it here and is freed with mem_free(). With
+   a memory limit large arrays are mapped from files (base/paged.h). */
 #ifndef GBT_BASE_MEMORY_H
 #define GBT_BASE_MEMORY_H
 
@@ -22,8 +22,8 @@ void *mem_alloc(size_t count, size_t size, const char *what, gbt_error *err);
 /** The same, filled with zeros. */
 void *mem_calloc(size_t count, size_t size, const char *what, gbt_error *err);
 
-/** Whether other libraries could allocate `count * size` bytes now. Makes no file. @return GBT_OK or
-    GBT_ERR_NO_MEMORY, with a message as that of mem_alloc() */
+/** Check whether another library could allocate `count * size` bytes now; never uses a file. @return GBT_OK
+    or GBT_ERR_NO_MEMORY, with the message of mem_alloc() */
 gbt_status mem_check(size_t count, size_t size, const char *what, gbt_error *err);
 
 /**
@@ -35,12 +35,12 @@ gbt_status mem_check(size_t count, size_t size, const char *what, gbt_error *err
 gbt_status mem_reserve(void **array, size_t *capacity, size_t used, size_t count, size_t size,
                        const char *what, gbt_error *err);
 
-/** Cut `*array` to the `used` elements that it holds: what grew by half must not be kept by the hundred. On
-    failure nothing changes. */
+/** Shrink `*array` to its `used` elements: for code that keeps hundreds of arrays, whose spare room would add
+    up. On failure nothing changes. */
 gbt_status mem_trim(void **array, size_t *capacity, size_t used, size_t size, const char *what,
                     gbt_error *err);
 
-/** memcpy() of what may be as large as the memory that there is: with paged_check() on the way. */
+/** memcpy() for arrays that may be as large as the memory limit: calls paged_check() in between. */
 void mem_copy(void *to, const void *from, size_t bytes);
 
 void mem_free(void *pointer); /* NULL is fine */
@@ -48,7 +48,7 @@ void mem_free(void *pointer); /* NULL is fine */
 /** Test only: the n-th allocation from now fails (0 = the next one); a negative n switches this off. */
 void mem_fail_after(long n);
 
-/** Highest resident memory of the process since its program started, bytes. Some 20 microseconds. Threads:
+/** Peak resident memory of the process since its program started, bytes. Takes some 20 microseconds. Threads:
     any. */
 size_t mem_peak_bytes(void);
 

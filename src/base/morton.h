@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-/** Bit k of the lowest 21 to bit 3 k, zeros between. */
+/** Move each bit k of the lowest 21 bits to bit 3 k, with zeros between. */
 static inline uint64_t morton_spread(uint64_t x)
 {
     x = (x | x << 32) & UINT64_C(0x1F00000000FFFF);

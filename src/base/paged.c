@@ -18,7 +18,7 @@
 #include "base/unnamed_file.h"
 
 enum {
-    MAPPINGS_MOST = 1 << 15, /* half of what Linux gives a process (vm.max_map_count) */
+    MAPPINGS_MOST = 1 << 15, /* half of Linux's default limit per process (vm.max_map_count) */
     PAGE_LEAST = 4096
 };
 
@@ -28,11 +28,12 @@ typedef struct mapping {
 } mapping;
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-static mapping *mappings; /* by `start` */
+static mapping *mappings; /* sorted by `start` */
 static size_t mapping_capacity;
 static atomic_size_t mapping_count;
 static atomic_size_t resident_limit; /* 0: not started */
-static atomic_size_t let_go_above;   /* the limit; or, where what stays is more, that and a little */
+static atomic_size_t let_go_above;   /* threshold for paging out: the limit, or slightly more than what cannot
+                                        be paged out if that is larger */
 static char place[4096];
 
 gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
@@ -56,10 +57,10 @@ static gbt_status map_file(size_t bytes, const char *what, void **out, gbt_error
     gbt_error why = {0};
     if (unnamed_file_open(place, &file, &why) != GBT_OK)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s", why.text);
-    /* Room on the disk now, or a write to the array would end the process later. */
+    /* Reserve disk space now; otherwise a later write to the array on a full disk would kill the process. */
     const int failed = posix_fallocate(file, 0, (off_t)bytes);
     void *start = failed == 0 ? mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED, file, 0) : MAP_FAILED;
-    close(file); /* the mapping keeps it */
+    close(file); /* the mapping keeps the file alive */
     if (failed != 0)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no room for %zu bytes of %s: %s", place, bytes, what,
                          strerror(failed));
@@ -69,7 +70,7 @@ static gbt_status map_file(size_t bytes, const char *what, void **out, gbt_error
     return GBT_OK;
 }
 
-/* Where the mapping from `start` on is in their list, or would be. */
+/* Index of the mapping that begins at `start`, or where it would be inserted. */
 static size_t place_of(const void *start)
 {
     size_t low = 0, high = atomic_load(&mapping_count);
@@ -83,7 +84,7 @@ static size_t place_of(const void *start)
     return low;
 }
 
-/* Not by mem_reserve(), which would come here. */
+/* Does not use mem_reserve(), which would recurse. */
 static bool reserve_one(void)
 {
     if (atomic_load(&mapping_count) < mapping_capacity)
@@ -140,7 +141,8 @@ bool paged_unmap(void *pointer)
     return found;
 }
 
-/* Where more than the limit cannot be let go of, to ask for it at every turn would only cost time. */
+/* When more than the limit cannot be paged out, the threshold is raised, because trying in every call would
+   only cost time. */
 void paged_check(void)
 {
     const size_t limit = atomic_load_explicit(&resident_limit, memory_order_relaxed);
@@ -148,7 +150,8 @@ void paged_check(void)
         return;
     pthread_mutex_lock(&lock);
     for (size_t i = 0; i < atomic_load(&mapping_count); i++)
-        madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* of a shared file: values stay */
+        madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* a shared file mapping: values are
+                                                                         kept in the file */
     const size_t stays = mem_resident_bytes() + limit / 16;
     atomic_store(&let_go_above, stays > limit ? stays : limit);
     pthread_mutex_unlock(&lock);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/paged.h -- a process below a limit: its large arrays are mapped from unnamed files, whose pages are
-   let go of when it takes more than it may, and come back when they are touched. */
+/* base/paged.h -- keep a process within a memory limit: large arrays are mapped from unnamed files, whose
+   pages are dropped from memory when it exceeds the limit and read back on access. */
 #ifndef GBT_BASE_PAGED_H
 #define GBT_BASE_PAGED_H
 
@@ -9,26 +9,26 @@
 
 #include "gbtrace/status.h"
 
-/** Arrays of at least so many bytes. */
+/** Smallest size, in bytes, of arrays that are mapped from files. */
 #define PAGED_LEAST_BYTES ((size_t)1 << 18)
 
 /**
- * From now on mem_alloc() maps large arrays from files in `folder`; until paged_stop(). For the whole
- * process.
+ * Let mem_alloc() map large arrays from files in `folder`, for the whole process, until paged_stop().
  *
- * @param limit [in] bytes of resident memory above which paged_check() lets go
- * @return GBT_OK, or GBT_ERR_IO when no file can be made there
+ * @param limit [in] bytes of resident memory above which paged_check() drops pages
+ * @return GBT_OK, or GBT_ERR_IO when no file can be created there
  */
 gbt_status paged_start(const char *folder, size_t limit, gbt_error *err);
 
-/** No more files; those that are mapped stay until they are freed. */
+/** Use no more files; mapped arrays stay until they are freed. */
 void paged_stop(void);
 
 /**
- * Let go of the pages of all large arrays when the process is over the limit. Their values stay. Some
- * microseconds; nothing before paged_start().
+ * Drop the pages of all large arrays from memory if the process is over the limit; their values are kept in
+ * the files. Takes some microseconds; does nothing before paged_start().
  *
- * parallel_blocks() does it before each block. What touches many pages without blocks does it now and then.
+ * parallel_blocks() calls it before each block; code that touches many pages without blocks should call it
+ * regularly.
  * Threads: any, also while others use the arrays.
  */
 void paged_check(void);
@@ -39,10 +39,10 @@ void paged_check(void);
  */
 gbt_status paged_map(size_t bytes, const char *what, void **out, gbt_error *err);
 
-/** For mem_free(): true when `pointer` was mapped; it is no more. */
+/** For mem_free(): unmap `pointer`; false when it was not mapped. */
 bool paged_unmap(void *pointer);
 
-/** Resident memory of the process now, bytes; 0 where nobody says. */
+/** Present resident memory of the process, bytes; 0 when the system does not report it. */
 size_t mem_resident_bytes(void);
 
 #endif

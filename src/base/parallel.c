@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/parallel.c -- account of what blocks take; who runs them is in shim/. */
+/* base/parallel.c -- time accounting of parallel blocks; the schedulers are in shim/. */
 #include "base/parallel.h"
 
 #include <stdatomic.h>
@@ -16,7 +16,7 @@ typedef struct accounted_call {
 
 static _Thread_local parallel_account account;
 
-/* A block is a stage of its own: calls from inside it are accounted on the thread that makes them. */
+/* Time a block. Nested calls are accounted on the thread that makes them. */
 static void run_accounted(size_t block, size_t begin, size_t end, void *context)
 {
     accounted_call *call = context;
@@ -36,7 +36,8 @@ void parallel_blocks(size_t count, size_t grain, parallel_body *body, void *cont
     accounted_call call = {.body = body, .context = context};
     atomic_init(&call.work, 0);
     atomic_init(&call.longest, 0);
-    const parallel_account before = account; /* what blocks on this thread add is in their own time */
+    const parallel_account before =
+        account; /* nested calls are already part of the time of their blocks: drop what they add */
     const double start = clock_wall();
     parallel_run(count, grain, run_accounted, &call);
     account = (parallel_account){.wall = before.wall + clock_wall() - start,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/plain_numbers.c -- one C locale for all threads. */
+/* base/plain_numbers.c -- switch a thread to the C locale and back. */
 #include "base/plain_numbers.h"
 
 #include <pthread.h>
@@ -11,7 +11,7 @@ locale_t plain_numbers_begin(void)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, make_plain);
-    return uselocale(plain); /* (locale_t)0, which there was no memory for, changes nothing */
+    return uselocale(plain); /* without memory for the locale it is (locale_t)0, which changes nothing */
 }
 
 void plain_numbers_end(const locale_t *before) { uselocale(*before); }

@@ -6,13 +6,13 @@
 
 #include <locale.h>
 
-/** First in a function that reads or writes text: from here to where it returns, printf() and strtod() of
-   this thread go by the C locale. */
+/** Put this first in a function that reads or writes text: until it returns, printf() and strtod() of this
+    thread use the C locale. */
 #define PLAIN_NUMBERS                                                                                        \
     __attribute__((cleanup(plain_numbers_end), unused)) const locale_t plain_numbers_before =                \
         plain_numbers_begin()
 
-locale_t plain_numbers_begin(void); /* what the thread had */
+locale_t plain_numbers_begin(void); /* returns the thread's previous locale */
 void plain_numbers_end(const locale_t *before);
 
 #endif

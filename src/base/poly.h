@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/poly.h -- places where a small real polynomial changes sign on the positive axis. */
+/* base/poly.h -- sign changes of a real polynomial of low degree on the positive axis. */
 #ifndef GBT_BASE_POLY_H
 #define GBT_BASE_POLY_H
 
@@ -23,9 +23,9 @@ static inline int poly_quadratic_roots(const double c[3], double upper, double r
     double found[2];
     int found_count = 0, kept = 0;
     const double discriminant = c[1] * c[1] - 4 * c[0] * c[2];
-    if (discriminant <= 0) /* a double root is no change of sign */
+    if (discriminant <= 0) /* a double root is not a sign change */
         return 0;
-    const double q = -0.5 * (c[1] + copysign(sqrt(discriminant), c[1])); /* no cancellation */
+    const double q = -0.5 * (c[1] + copysign(sqrt(discriminant), c[1])); /* avoids cancellation */
     found[found_count++] = c[0] / q;
     if (c[2] != 0)
         found[found_count++] = q / c[2];
@@ -40,8 +40,8 @@ static inline int poly_quadratic_roots(const double c[3], double upper, double r
     return kept;
 }
 
-/** Where a polynomial of degree < POLY_LIMIT changes sign in (0, upper), ascending: at most once between two
-    turning points. */
+/** Sign changes of a polynomial of degree < POLY_LIMIT in (0, upper), ascending. Between two extrema there is
+    at most one. */
 static inline int poly_roots(const double *c, int degree, double upper, double roots[POLY_LIMIT])
 {
     while (degree > 0 && c[degree] == 0)

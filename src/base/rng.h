@@ -10,21 +10,22 @@
 #include <stdint.h>
 
 /**
- * Every stream that is drawn from with the seed of a run (gbt_train_def.seed), and what its indices are.
+ * All random streams that use the seed of a run (gbt_train_def.seed), with the meaning of their indices.
  *
- * Growth has one for each step and level, step * GROWTH_MAX_LEVELS + level, whose indices are Gaussians.
- * Those of steps 0 and 1, in which a run grows only if its first twentieth has at most one step, are some of
- * these: whether a Gaussian makes an anchor may then be decided by a number that decides something else as
- * well. It is uniform all the same, and nothing brings the two together.
+ * Growth uses one stream per step and level, step * GROWTH_MAX_LEVELS + level, indexed by Gaussians. For
+ * steps 0 and 1 these coincide with some of the streams below, so that a number may be used twice. A run
+ * grows in these steps only if its first twentieth has at most one step; the numbers are still uniform, and
+ * the two uses do not interact.
  */
 enum {
     RNG_STREAM_RANDOM_ANCHORS = 0, /* points */
-    RNG_STREAM_PHOTO_ORDER = 1,    /* epoch << 32 | place in it */
-    RNG_STREAM_NETWORKS = 2,       /* 0 alone: makes the seed of decoder_init() */
+    RNG_STREAM_PHOTO_ORDER = 1,    /* epoch << 32 | position in the epoch */
+    RNG_STREAM_NETWORKS = 2,       /* only index 0: the seed of decoder_init() */
     RNG_STREAM_SEED_POINTS = 3,    /* samples */
     RNG_STREAM_PIXELS = 4,         /* views of the run, in the order of steps */
     RNG_STREAM_BACKGROUND = 8,     /* views of the run */
-    RNG_STREAM_LEFT_OUT = 10       /* << 48 | view of the run: one for each view; anchors */
+    RNG_STREAM_LEFT_OUT = 10       /* (this << 48 | view of the run) is one stream per view, indexed by
+                                      anchors */
 };
 
 /** Four independent 32-bit words for one key and counter. */

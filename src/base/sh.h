@@ -8,7 +8,7 @@
 
 enum { SH_COUNT = 16 };
 
-/** Functions up to a degree in [0, 3]. */
+/** Number of functions up to a degree in [0, 3]. */
 static inline int sh_count(int degree) { return (degree + 1) * (degree + 1); }
 
 /** All 16 at a unit direction, from the camera to the Gaussian. Orthonormal over the sphere. */
@@ -37,7 +37,7 @@ SH_BASIS(sh_basis, float)
 SH_BASIS(sh_basis_exact, double)
 #undef SH_BASIS
 
-/** Their gradients by the direction; only what is at right angles to it means anything. */
+/** Gradients of the functions by the direction; only the component orthogonal to it is meaningful. */
 static inline void sh_basis_gradient(const float d[3], float out[SH_COUNT][3])
 {
     const float x = d[0], v = d[1], z = d[2], xx = x * x, yy = v * v, zz = z * z;

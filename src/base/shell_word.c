@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/shell_word.c -- text in single quotes; a quote in it stands outside of them: 'it'\''s'. */
+/* base/shell_word.c -- quote text for a shell in single quotes; a quote in the text is written outside of
+   them: 'it'\''s'. */
 #include "gbtrace/progress.h"
 
 #include <stdio.h>

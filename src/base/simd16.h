@@ -3,10 +3,10 @@
 
    A kernel includes this file and is compiled once per instruction set (gbt_kernels in CMakeLists.txt). Every
    operation gives the same bits in all of them, because fused multiply-adds are named and sums have a fixed
-   order; so a kernel's result does not depend on the machine. The plain form is the definition; a file that
-   defines SIMD16_PLAIN gets it where the compiler has vectors, too.
+   order; so a kernel's result does not depend on the machine. The plain version defines the results; a file
+   that defines SIMD16_PLAIN gets it even if the compiler has vectors.
 
-   vfloat16: 16 floats; vfloat8: 8, sums of lanes that are eight apart; vmask16: 16 truth values. */
+   vfloat16: 16 floats; vfloat8: 8 floats, sums of lanes that are eight apart; vmask16: 16 booleans. */
 #ifndef GBT_BASE_SIMD16_H
 #define GBT_BASE_SIMD16_H
 
@@ -87,12 +87,12 @@ static inline vfloat16 vfloat16_sum_rows(const vfloat16 in[16])
     return vfloat8_sum_rows(half);
 }
 
-/** The smallest x of vfloat16_exp2(). 2^-120 of an opacity is far below the least alpha_min that can be set,
-    1e-30. */
+/** The smallest argument of vfloat16_exp2(). An opacity times 2^-120 is far below the smallest possible
+    alpha_min, 1e-30. */
 #define EXP2_LEAST (-120.0f)
 
-/** 2^x for x in [-120, 0]; largest error about 1 ulp. Taylor of 2^r to r^6 on [-1/2, 1/2], in pairs, for the
-    sake of latency. */
+/** 2^x for x in [-120, 0]; largest error about 1 ulp. Taylor polynomial of 2^r to r^6 on [-1/2, 1/2],
+    evaluated in pairs of terms to reduce latency. */
 static inline vfloat16 vfloat16_exp2(vfloat16 x)
 {
     const vfloat16 n = vfloat16_round(x), r = vfloat16_sub(x, n), rr = vfloat16_mul(r, r);

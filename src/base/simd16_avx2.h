@@ -58,7 +58,8 @@ static inline vfloat16 vfloat16_mul_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_select(m, vfloat16_mul(x, y), x);
 }
-/* Here -0 becomes 0 where nothing is added: sums that begin with 0 are never -0. */
+/* In this version -0 becomes 0 where nothing is added; that is harmless, because sums that start at 0 are
+   never -0. */
 static inline vfloat16 vfloat16_add_where(vmask16 m, vfloat16 x, vfloat16 y)
 {
     return vfloat16_add(x, VFLOAT16_BOTH(_mm256_and_ps, m, y));
@@ -124,7 +125,7 @@ static inline vmask16 vmask16_from_bits(unsigned bits)
                      _mm256_castsi256_ps(_mm256_cmpeq_epi32(high, pick))};
 }
 
-/* All in registers: four lanes stored at a time would not be ready when eight of them are loaded. */
+/* Entirely in registers: storing four lanes at a time and loading eight would stall on store forwarding. */
 #define VFLOAT16_REDUCE_ROWS(name, op)                                                                       \
     static inline __m256 name##_eight(const vfloat16 in[8])                                                  \
     {                                                                                                        \
@@ -159,7 +160,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
     return (vfloat16){sum8_rows(in), sum8_rows(in + 8)};
 }
 
-/* Eight rows of eight, turned. */
+/* Transpose 8 x 8 floats. */
 static inline void turn8(const float *const rows[8], __m256 out[8])
 {
     __m256 x[8], y[8];

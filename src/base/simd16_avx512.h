@@ -72,8 +72,8 @@ static inline vmask16 vmask16_andnot(vmask16 a, vmask16 b) { return (vmask16)(b 
 static inline unsigned vmask16_bits(vmask16 m) { return m; }
 static inline vmask16 vmask16_from_bits(unsigned bits) { return (vmask16)bits; }
 
-/* first + number of every lane that is true, in order; sixteen places of `out` are written. Returned: how
-   many are true. */
+/* Write first + lane number for every true lane, in order; all sixteen elements of `out` are overwritten.
+   Returns the number of true lanes. */
 #define VMASK16_NUMBERS
 static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
 {
@@ -83,8 +83,8 @@ static inline unsigned vmask16_numbers(vmask16 m, uint32_t first, uint32_t *out)
     return (unsigned)__builtin_popcount(m);
 }
 
-/* The values of every lane that is true, in order; up to sixteen places of `out` are written. Returned: how
-   many are true. */
+/* Write the values of every true lane, in order; up to sixteen elements of `out` are overwritten. Returns the
+   number of true lanes. */
 #define VMASK16_PACK
 static inline unsigned vmask16_pack(vmask16 m, const uint32_t *from, uint32_t *out)
 {
@@ -129,7 +129,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
     return _mm512_insertf32x8(_mm512_castps256_ps512(sum8_rows(in)), sum8_rows(in + 8), 1);
 }
 
-/* out[j] lane i = rows[i][j]: sixteen rows of sixteen floats, turned. */
+/* Transpose 16 x 16 floats: lane i of out[j] = rows[i][j]. */
 static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])
 {
     vfloat16 x[16], y[16];

@@ -64,7 +64,7 @@ static inline vfloat16 vfloat16_fnma(vfloat16 x, vfloat16 y, vfloat16 z)
                       vfmsq_f32(z.d, x.d, y.d)};
 }
 
-/* As the definition has it, the second one for a NaN: FMIN and FMAX of NEON would give the NaN. */
+/* As in the plain version, NaN gives the second argument; NEON's FMIN and FMAX would return the NaN. */
 static inline float32x4_t lesser4(float32x4_t x, float32x4_t y) { return vbslq_f32(vcltq_f32(x, y), x, y); }
 static inline float32x4_t greater4(float32x4_t x, float32x4_t y) { return vbslq_f32(vcgtq_f32(x, y), x, y); }
 static inline vfloat16 vfloat16_min(vfloat16 x, vfloat16 y)
@@ -127,7 +127,7 @@ static inline vmask16 vmask16_from_bits(unsigned bits)
                      vtstq_u32(all, vshlq_n_u32(bit, 8)), vtstq_u32(all, vshlq_n_u32(bit, 12))};
 }
 
-/* The lower halves of x and y, and the upper ones. */
+/* Combine the lower halves, or the upper halves, of x and y. */
 static inline float32x4_t lower_halves(float32x4_t x, float32x4_t y)
 {
     return vreinterpretq_f32_f64(vzip1q_f64(vreinterpretq_f64_f32(x), vreinterpretq_f64_f32(y)));
@@ -185,7 +185,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
     return (vfloat16){sum4_rows(in), sum4_rows(in + 4), sum4_rows(in + 8), sum4_rows(in + 12)};
 }
 
-/* Four rows of four, turned. */
+/* Transpose 4 x 4 floats. */
 static inline void turn4(const float *const rows[4], size_t column, float32x4_t out[4])
 {
     const float32x4_t x = vld1q_f32(rows[0] + column), y = vld1q_f32(rows[1] + column);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/simd16_plain.h -- simd16.h in plain C: the definition. */
+/* base/simd16_plain.h -- simd16.h in plain C, which defines the results. */
 #ifndef GBT_BASE_SIMD16_PLAIN_H
 #define GBT_BASE_SIMD16_PLAIN_H
 

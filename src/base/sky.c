@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/sky.c -- colours of a background by direction. */
+/* base/sky.c -- evaluate a background whose colour depends on direction. */
 #include "base/sky.h"
 
 #include "base/clones.h"
@@ -37,7 +37,7 @@ FASTEST_CLONE static void varying_colors(const sky *s, const float color[3], flo
             float sum = color[c];
             for (int k = 1; k < SH_COUNT; k++)
                 sum += s->harmonic[k - 1][c] * basis[k][lane];
-            sum = sum < 0 ? 0 : sum; /* what is not a number stays none */
+            sum = sum < 0 ? 0 : sum; /* NaN stays NaN */
             out[c][lane] = sum > 1 ? 1 : sum;
         }
 }

@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/stage.h -- what a stage of a computation takes of one thread, and of all. */
+/* base/stage.h -- measure the time of a stage: wall time, work of all threads, and span. */
 #ifndef GBT_BASE_STAGE_H
 #define GBT_BASE_STAGE_H
 
 #include "base/clock.h"
 #include "base/parallel.h"
 
-/** Seconds. On p threads that nothing else uses a stage takes at least work / p and at least span, and at
-   most (work - span) / p + span. */
+/** Seconds. On p otherwise idle threads a stage takes at least max(work / p, span) and at most (work - span)
+    / p + span. */
 typedef struct stage_time {
     double wall;
     double work; /* of all threads */
-    double span; /* what the calling thread does alone, and the longest block of each parallel call */
+    double span; /* critical path: serial time of the calling thread plus the longest block of each parallel
+                    call */
 } stage_time;
 
-/** When a stage began. */
+/** Start of a stage. */
 typedef struct stage_clock {
     double wall;
     parallel_account parallel;
@@ -22,7 +23,7 @@ typedef struct stage_clock {
 
 static inline stage_clock stage_begin(void) { return (stage_clock){clock_wall(), parallel_account_now()}; }
 
-/** What was done since the clock began; it begins again. Both on the same thread. */
+/** Time since the start of the clock, which is restarted. Use a clock on one thread only. */
 static inline stage_time stage_lap(stage_clock *since)
 {
     const stage_clock now = stage_begin();

@@ -13,23 +13,24 @@
 static const int64_t one_second = 1000000000;
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-static int loops;                          /* between catch and release */
-static struct sigaction old_int, old_term; /* who handled them before */
+static int loops;                          /* number of loops between catch and release */
+static struct sigaction old_int, old_term; /* previous handlers */
 
-/* For the handler, which may run in another thread than the loop: free of locks. */
+/* Lock-free, for the signal handler, which may run on any thread. */
 static _Atomic int64_t asked_at; /* nanoseconds; 0: no signal so far */
 static void (*_Atomic wake_loop)(void *context) = NULL;
 static void *_Atomic wake_context = NULL;
 
-/* Nothing but the process's end, or what else its host does at this signal, is left to ask for. */
+/* Pass the signal to the previous handler, which usually ends the process. */
 static void hand_back(int number)
 {
     struct sigaction old = number == SIGINT ? old_int : old_term;
-    if (old.sa_handler == SIG_IGN) /* as in the background of a script */
+    if (old.sa_handler == SIG_IGN) /* ignored, as in a script's background jobs */
         old.sa_handler = SIG_DFL;
     sigaction(number, &old, NULL);
     raise(number);
-    if (old.sa_handler == SIG_DFL) /* the first process of a container outlives it */
+    if (old.sa_handler == SIG_DFL) /* still alive: the default action does not end the first process of a
+                                      container */
         _exit(128 + number);
 }
 
@@ -41,7 +42,8 @@ static void on_signal(int number)
     int64_t first = 0;
     void (*wake)(void *) = wake_loop;
     if (!atomic_compare_exchange_strong(&asked_at, &first, now)) {
-        if (now - first > one_second) /* else one request, told twice: by a terminal and by a wrapper */
+        if (now - first > one_second) /* otherwise it is the same request, delivered twice by a terminal and a
+                                         wrapper */
             hand_back(number);
     } else if (wake != NULL) {
         wake(wake_context);

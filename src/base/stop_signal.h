@@ -1,22 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/stop_signal.h -- SIGINT and SIGTERM while loops run: the first one asks all of them to stop, as do
-   others within a second of it; a later one goes to who handled it before, which mostly ends the process. */
+/* base/stop_signal.h -- SIGINT and SIGTERM while loops run. The first signal asks all loops to stop; others
+   within a second are ignored; a later one goes to the previous handler, which usually ends the process. */
 #ifndef GBT_BASE_STOP_SIGNAL_H
 #define GBT_BASE_STOP_SIGNAL_H
 
 #include <stdbool.h>
 
-/** Catch both signals until as many stop_signal_release(). Threads: any, also at once. */
+/** Catch both signals until stop_signal_release() has been called as often as this. Threads: any, also
+    concurrently. */
 void stop_signal_catch(void);
 
-/** The last one forgets the signal; who handled them before does again. */
+/** The last release clears the signal and restores the previous handlers. */
 void stop_signal_release(void);
 
-/** Whether to stop; between stop_signal_catch() and stop_signal_release(). Threads: any. */
+/** Whether a signal has asked to stop; call between stop_signal_catch() and stop_signal_release(). Threads:
+    any. */
 bool stop_signal_seen(void);
 
 /**
- * What else the first signal does, for one loop of the process.
+ * Set what the first signal does in addition, for one loop of the process.
  *
  * @param wake [in] called with `context` in the handler, in any thread; async-signal-safe. NULL: nothing
  */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/symmetric.c -- Jacobi's rotations, Cholesky's factor. */
+/* base/symmetric.c -- Jacobi eigenvalue iteration and Cholesky factorisation. */
 #include "base/symmetric.h"
 
 #include <math.h>
 
 enum { SWEEPS_MAX = 60 /* convergence is quadratic; the bound only states that the loop ends */ };
 
-/* The rotation that makes a[p][q] zero; the columns of v follow. */
+/* Apply the rotation that makes a[p][q] zero to `a` and to the columns of `v`. */
 static void rotate(double *a, double *v, int n, int p, int q)
 {
     const double apq = a[p * n + q];

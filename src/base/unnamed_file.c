@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/unnamed_file.c -- files that are gone when they are closed. */
+/* base/unnamed_file.c -- unnamed temporary files. */
 #include "base/unnamed_file.h"
 
 #include <errno.h>

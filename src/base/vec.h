@@ -12,8 +12,8 @@
 #define HALF_LOG2_E 0.72134752044448170368 /* exp(-x / 2) = 2^(-x HALF_LOG2_E) */
 #define GOLDEN_ANGLE 2.399963229728653     /* radians */
 
-/** x to the precision of a float. Through memory: GCC 12 for x86-64 leaves both conversions out where it puts
-   two neighbours into one register. */
+/** x rounded to float precision. It goes through memory, because GCC 12 for x86-64 drops both conversions
+    when it vectorises two neighbouring values. */
 static inline double rounded_to_float(double x)
 {
     volatile float rounded = (float)x;
@@ -35,10 +35,10 @@ static inline void dvec_cross(const double a[3], const double b[3], double out[3
 
 static inline double dvec_length(const double a[3]) { return sqrt(dvec_dot(a, a)); }
 
-/** The length of (x, y): the same bits everywhere, which hypot does not have. */
+/** The length of (x, y), with the same bits everywhere, unlike hypot(). */
 static inline double dvec_length2(double x, double y) { return sqrt(x * x + y * y); }
 
-/** Direction i of `count` that are spread evenly over the sphere: a Fibonacci spiral (Gonzalez 2010). */
+/** Direction i of `count` directions spread evenly over the sphere by a Fibonacci spiral (Gonzalez 2010). */
 static inline void dvec_on_sphere(int i, int count, double out[3])
 {
     const double z = 1 - (2 * i + 1.0) / count, across = sqrt(1 - z * z), turn = i * GOLDEN_ANGLE;
@@ -69,7 +69,7 @@ static inline void dmat_apply(const double m[9], const double a[3], double out[3
     out[2] = z;
 }
 
-/** |m m^T - 1| is nowhere above the tolerance, and m does not reflect. */
+/** Whether every element of |m m^T - I| is at most the tolerance, and m is not a reflection. */
 static inline bool dmat_is_rotation(const double m[9], double tolerance)
 {
     double cross[3], worst = 0;
@@ -91,8 +91,8 @@ static inline void dmat_apply_transposed(const double m[9], const double a[3], d
     out[2] = z;
 }
 
-/** Unit quaternion of a rotation matrix. The largest of the four is found first, from the diagonal: nothing
-   is divided by something small. */
+/** Unit quaternion of a rotation matrix. The largest component is found first, from the diagonal, so that
+    there is no division by a small number. */
 static inline void dquat_of_matrix(const double m[9], double q[4])
 {
     const double square[4] = {1 + m[0] + m[4] + m[8], 1 + m[0] - m[4] - m[8], 1 - m[0] + m[4] - m[8],

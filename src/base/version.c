@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/version.c -- the version that was compiled in. */
+/* base/version.c -- the version compiled into the library. */
 #include "gbtrace/version.h"
 
 const char *gbt_version(void) { return GBT_VERSION; }

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/camera_file.c -- a camera file: one picture to take, in JSON. */
+/* render/camera_file.c -- read a camera file: JSON that describes one camera to render from.
+
+   Pose, lens, aperture, rolling shutter, or an image of rays in their place; docs/cameras.md lists the
+   fields. What comes out is a ray_shot in scene-local coordinates. */
 #include "render/camera_file.h"
 
 #include <ctype.h>
@@ -14,8 +17,8 @@
 
 enum { SAMPLES_MAX = 65536 };
 
-/* The models that a field of view, or the width of a view, says all of: two focal lengths and a centre at
-   most. In a file their names have small letters. */
+/* The camera models that a file may name, in lower case: those that a field of view or a view width describes
+   completely, because they have no more parameters than two focal lengths and a principal point. */
 enum { FILE_MODELS_MAX = 8, FILE_NAME_SIZE = 32 };
 
 typedef struct file_models {
@@ -83,7 +86,7 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
     return GBT_OK;
 }
 
-/* origin, target and up as they stand in the file; those that are missing stay. */
+/* The pose as the file gives it, in world coordinates. Missing fields keep the values set before. */
 typedef struct stand {
     double origin[3], target[3], up[3];
 } stand;
@@ -124,7 +127,7 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     GBT_TRY(json_field_names(&inner, " origin target up "));
     gbt_camera last = shot->camera;
     GBT_TRY(take_pose(&inner, false, origin, &at, &last));
-    /* The two poses are those of the middles of the first and the last line. */
+    /* The file gives the poses at the middle of the first line and at the middle of the last. */
     const int lines = direction == 0 ? last.height : last.width;
     const double edge = lines > 1 ? 0.5 / (lines - 1) : 0;
     camera_set_readout(&shot->camera, &last,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/camera_group.c -- what a set of cameras has in common. */
+/* render/camera_group.c -- what a set of cameras has in common: up direction, focus, distance, lens. */
 #include "render/camera_group.h"
 
 #include <math.h>
@@ -12,22 +12,22 @@
 #include "base/symmetric.h"
 #include "base/vec.h"
 
-/* Cameras are taken to lie in a plane when their spread across it is below this share of the next larger, and
-   it faces up. */
+/* The cameras count as coplanar when their spread (std-dev) across the plane is below flat_share of the next
+   larger one. The plane's normal is taken as "up" only if it is close to the mean of the cameras' up axes. */
 static const double flat_share = 0.2, flat_cosine = 0.7;
-/* Nearer to the cameras than this share of the points' distance they look at nothing: they turned on the
-   spot, and their axes meet where they stand. */
+/* If the focus is nearer to the cameras than this share of the distance to the points, the cameras only
+   rotated in place: their axes meet at their own position. */
 static const double on_the_spot_share = 0.02;
-static const double tan_widest = 2; /* of a lens that no pinhole stands for, 127 degrees */
+static const double tan_widest = 2; /* limit for lenses wider than any useful pinhole: 127 degrees */
 
-/** Of `count` values the one with `rank` smaller ones; sorts. */
+/** The value with `rank` smaller ones among `count` values. Sorts the array. */
 static double ranked(double *values, size_t count, size_t rank)
 {
     qsort(values, count, sizeof *values, compare_doubles);
     return values[rank];
 }
 
-/** The upper median; sorts. */
+/** The upper median. Sorts the array. */
 static double median(double *values, size_t count) { return ranked(values, count, count / 2); }
 
 static void mean_center(const gbt_camera *cameras, size_t count, double out[3])
@@ -38,7 +38,8 @@ static void mean_center(const gbt_camera *cameras, size_t count, double out[3])
             out[k] += cameras[i].center[k] / (double)count;
 }
 
-/** Mean of an axis of the cameras: 1 down, 2 forward. Its length says how much they agree. */
+/** Mean of one axis of the cameras (1: down, 2: forward). The closer its length is to 1, the more they agree.
+ */
 static void mean_axis(const gbt_camera *cameras, size_t count, int axis, double out[3])
 {
     memset(out, 0, 3 * sizeof *out);
@@ -69,14 +70,15 @@ static void find_up(const gbt_camera *cameras, size_t count, const double middle
     const double one = spread[4 * ((low + 1) % 3)], other = spread[4 * ((low + 2) % 3)],
                  next = fmin(one, other), largest = fmax(one, other);
     const double normal[3] = {axes[low], axes[3 + low], axes[6 + low]}, cosine = dvec_dot(normal, up);
-    /* Three cameras always lie in a plane, and cameras on a line in many. */
+    /* Three cameras always lie in one plane, and collinear cameras lie in many. */
     if (count > 3 && next > flat_share * flat_share * largest &&
         spread[4 * low] < flat_share * flat_share * next && fabs(cosine) > flat_cosine)
         for (int k = 0; k < 3; k++)
             up[k] = cosine < 0 ? -normal[k] : normal[k];
 }
 
-/** Along the mean direction of view, as deep as the points in front; false without such. */
+/** A point in the mean viewing direction, at the median depth of the points in front; false if none is in
+    front, or if there is no clear mean direction. */
 static bool amid_points(const gbt_camera *cameras, size_t count, const double middle[3], const float *points,
                         size_t point_count, double *depth, double out[3])
 {
@@ -131,7 +133,8 @@ static double median_distance(const gbt_camera *cameras, size_t count, const dou
     return median(scratch, count);
 }
 
-/** From `middle` to the nearest tenth of the points: backgrounds may be far. 0 without points. */
+/** From `middle` to the point at the nearest tenth: a median would be drawn out by distant backgrounds. 0
+    without points. */
 static double near_point_distance(const float *points, size_t count, const double middle[3], double *scratch)
 {
     for (size_t i = 0; i < count; i++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/camera_group.h -- what a set of cameras has in common: which way is up, what they look at, from how
-   far, through which lens. */
+/* render/camera_group.h -- what a set of cameras has in common: the up direction, the point they look at, its
+   distance, and a typical lens. */
 #ifndef GBT_RENDER_CAMERA_GROUP_H
 #define GBT_RENDER_CAMERA_GROUP_H
 
@@ -10,18 +10,20 @@
 #include "gbtrace/status.h"
 
 typedef struct camera_group {
-    double up[3];    /* unit: across the plane that more than three cameras lie in when there is one, else the
-                        mean of their upward axes */
+    double up[3]; /* unit; normal of the plane in which more than three cameras lie, else the mean of their up
+                     axes */
     double focus[3]; /* the point that they look at */
-    double distance; /* median from a camera to the focus, > 0; to the points where they turned on the spot */
-    gbt_camera lens; /* a pinhole at rest: the size of the first camera, and the median view across the
-                        shorter side */
+    double distance; /* median from a camera to the focus, > 0; to the points if the cameras only rotated in
+                        place */
+    gbt_camera lens; /* a pinhole without motion: the size of the first camera, and the median field of view
+                        across the shorter side */
 } camera_group;
 
 /**
- * The focus is the point nearest to all axes of view (least squares). Where the axes are within about 6
- * degrees of each other, most cameras look away from that point, or it is where they stand, it is the median
- * depth of the points in front of the mean camera; without such points the local origin.
+ * The focus is the point nearest to all viewing axes (least squares). It is replaced if the axes are within
+ * about 6 degrees of each other, if most cameras look away from it, or if it is where the cameras stand: then
+ * it lies in the mean viewing direction at the median depth of the points in front, or, without such points,
+ * at the local origin.
  *
  * @param cameras [in] [count], count >= 1, poses finite
  * @param points  [in] [point_count][3], scene-local
@@ -30,7 +32,7 @@ typedef struct camera_group {
 gbt_status camera_group_make(const gbt_camera *cameras, size_t count, const float *points, size_t point_count,
                              camera_group *out, gbt_error *err);
 
-/** The group's lens for pictures of another size: the shorter side sees as much as before. */
+/** The group's lens for pictures of another size, with the same field of view across the shorter side. */
 gbt_camera camera_group_lens(const camera_group *group, int width, int height);
 
 #endif

@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/camera_path.c -- the cameras of a film, one a frame. */
+/* render/camera_path.c -- the cameras of a film, one per frame.
+
+   Two kinds of path. An orbit goes around the focus of a set of cameras and takes radius, height and aim at
+   each angle from the cameras near that angle. A path through key cameras is a Catmull-Rom spline of position
+   and rotation, measured in small steps so that frames are evenly spaced along it. */
 #include "render/camera_path.h"
 
 #include <math.h>
@@ -29,18 +33,18 @@ void camera_path_free(camera_path *path)
     *path = (camera_path){0};
 }
 
-/* ---- around ---- */
+/* ---- orbit ---- */
 
-/** Where a camera stands around the axis. */
+/** A camera in cylindrical coordinates about the orbit's axis. */
 typedef struct station {
-    double angle, radius, height; /* radians in (-pi, pi], from the first camera */
-    double aim[3];                /* from the focus to the nearest point that the camera looks at */
+    double angle, radius, height; /* angle in (-pi, pi], 0 at the first camera */
+    double aim[3];                /* from the focus to the point of the viewing axis nearest to it */
 } station;
 
 typedef struct circle {
     double focus[3], axis[3], across[2][3]; /* axis and across: right-handed, unit */
-    double start, arc;                      /* radians; an arc of 2 pi is all around */
-    station *stations;                      /* [count], by angle; owned */
+    double start, arc;                      /* radians; arc 2 pi: the full circle */
+    station *stations;                      /* [count], sorted by angle; owned */
     size_t count;
 } circle;
 
@@ -55,8 +59,8 @@ static void make_axes(const double up[3], const double towards[3], circle *c)
     memcpy(c->axis, up, sizeof c->axis);
     for (int k = 0; k < 3; k++)
         c->across[0][k] = towards[k] - along * up[k];
-    if (!(dvec_length(c->across[0]) > 1e-9 * dvec_length(towards))) { /* straight above: any direction will do
-                                                                       */
+    if (!(dvec_length(c->across[0]) > 1e-9 * dvec_length(towards))) { /* straight above the focus: any
+                                                                         direction will do */
         const int least = fabs(up[0]) <= fabs(up[1]) && fabs(up[0]) <= fabs(up[2]) ? 0
                           : fabs(up[1]) <= fabs(up[2])                             ? 1
                                                                                    : 2;
@@ -67,8 +71,8 @@ static void make_axes(const double up[3], const double towards[3], circle *c)
     dvec_cross(c->axis, c->across[0], c->across[1]);
 }
 
-/** The arc that the stations cover: what the largest gap between neighbours leaves, without the outermost of
-    many. */
+/** The arc that the stations cover: the circle without the largest gap between neighbours. When there are
+    many, the outermost 4 % at either end are dropped. */
 static void find_arc(circle *c)
 {
     static const double gap_most = PI / 2, arc_least = 40 * PI / 180;
@@ -80,8 +84,9 @@ static void find_arc(circle *c)
             gap = c->stations[i].angle - c->stations[i - 1].angle;
             first = i;
         }
+    /* The full circle begins at the first camera, whose angle is 0. */
     c->start = 0;
-    c->arc = 2 * PI; /* from the first camera, where the angle is 0 */
+    c->arc = 2 * PI;
     if (gap <= gap_most)
         return;
     const size_t low = first + spare, high = first + n - 1 - spare;
@@ -108,7 +113,7 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
         if (i == 0)
             make_axes(g->up, way, c);
         const double x = dvec_dot(way, c->across[0]), y = dvec_dot(way, c->across[1]);
-        /* from straight above there is no way around */
+        /* The radius has a lower limit: a camera straight above the focus would leave no way around it. */
         station *s = &c->stations[i];
         *s = (station){atan2(y, x), fmax(dvec_length2(x, y), 0.05 * g->distance), dvec_dot(way, g->up), {0}};
         const double *forward = cameras[i].rotation + 6, depth = -dvec_dot(way, forward);
@@ -120,12 +125,12 @@ static gbt_status circle_make(const gbt_camera *cameras, size_t count, const cam
     return GBT_OK;
 }
 
-/** As far and as high as the cameras are at about that angle, and where they look: means, weighted with a
-    spread of 20 degrees. */
+/** Position and target at an angle: weighted means over the cameras, by a Gaussian-like (von Mises) weight
+    with a spread of 20 degrees about that angle. */
 static void circle_at(const circle *c, const orbit_shape *shape, double angle, double out[3],
                       double target[3])
 {
-    static const double spread = 0.122; /* squared, radians */
+    static const double spread = 0.122; /* radians squared */
     double weight = 0, radius = 0, height = 0, aim[3] = {0};
     for (size_t i = 0; i < c->count; i++) {
         const double w = exp((cos(angle - c->stations[i].angle) - 1) / spread);
@@ -184,26 +189,26 @@ gbt_status camera_path_show(camera_path *path, const shared_points *points, gbt_
     return GBT_OK;
 }
 
-/* ---- through cameras ---- */
+/* ---- through key cameras ---- */
 
 enum {
-    POSE = 7, /* centre, 2 L q */
+    POSE = 7, /* centre, and 2 L times the quaternion */
     ZOOM = POSE,
     DIMENSIONS,
-    STEPS = 64 /* of a segment, to measure its length */
+    STEPS = 64 /* per segment, to measure its length */
 };
 
 typedef struct pose_curve {
     const gbt_camera *keys;
-    size_t *key;                 /* [count]: index of the camera; equal neighbours are left out */
+    size_t *key; /* [count]: index of the camera; of consecutive equal ones only the first is kept */
     double (*point)[DIMENSIONS]; /* [count]: centre, 2 L q, L log zoom */
-    double (*slope)[DIMENSIONS]; /* [count]: by the knot's parameter; of the pose */
-    double *gap;                 /* [count - 1]: from knot to knot of the pose; 0: it stays */
+    double (*slope)[DIMENSIONS]; /* [count]: of the pose only, by the spline parameter */
+    double *gap; /* [count - 1]: parameter step between knots, from their poses; 0: the pose stays */
     size_t count;
     double turn_length;
 } pose_curve;
 
-/** In the first `dimensions`: POSE or DIMENSIONS. */
+/** Euclidean distance in the first `dimensions` coordinates: POSE or DIMENSIONS. */
 static double distance_of(const double *a, const double *b, int dimensions)
 {
     double sum = 0;
@@ -212,8 +217,9 @@ static double distance_of(const double *a, const double *b, int dimensions)
     return sqrt(sum);
 }
 
-/** The point of a camera; its quaternion on the side of `before` (NULL: any). `focal`: params[0], which
-    is a length in pixels in every model, of the lens whose zoom is 1. */
+/** The camera as a point of the curve. Of q and -q, which are the same rotation, the one nearer to that of
+    `before` is taken (NULL: either). `focal` is the params[0] at which zoom is 1; in every model params[0] is
+    a length in pixels. */
 static void point_of(const gbt_camera *camera, double focal, double turn_length, const double *before,
                      double out[DIMENSIONS])
 {
@@ -228,14 +234,15 @@ static void point_of(const gbt_camera *camera, double focal, double turn_length,
     out[ZOOM] = turn_length * log(camera->params[0] / focal);
 }
 
-/** From point i to the next, by the knot's parameter; 0 where the pose stays. */
+/** Slope of the chord from point i to the next, by the spline parameter; 0 where the pose stays. */
 static double chord_of(const pose_curve *c, size_t i, int k)
 {
     return c->gap[i] > 0 ? (c->point[i + 1][k] - c->point[i][k]) / c->gap[i] : 0;
 }
 
-/** Slopes of the non-uniform Catmull-Rom spline: those of the parabola through a knot and its neighbours; of
-    the chord at the ends; 0 beside a gap of 0, so that a camera which zooms in one place stays there. */
+/** Slopes of the non-uniform Catmull-Rom spline: at a knot that of the parabola through it and its two
+    neighbours, at the ends that of the chord. Beside a gap of 0 the slope is 0, so that a camera that only
+    zooms does not move. */
 static void find_slopes(pose_curve *c)
 {
     for (size_t i = 0; i < c->count; i++)
@@ -282,8 +289,8 @@ static void curve_free(pose_curve *c)
     mem_free(c->gap);
 }
 
-/** Centre, unit quaternion times 2 L, and L log zoom, at u in [0, 1] of a segment. Zoom is not smooth at the
-    keys, for the lens is not. */
+/** The curve at u in [0, 1] of a segment: centre, unit quaternion times 2 L, L log zoom. Zoom is linear
+    between keys, as the other lens parameters are, and so has kinks at the keys. */
 static void curve_at(const pose_curve *c, size_t segment, double u, double out[DIMENSIONS])
 {
     if (c->count == 1) {
@@ -319,7 +326,7 @@ static void set_camera(const pose_curve *c, size_t segment, double u, gbt_camera
     dquat_to_matrix(q, out->rotation);
 }
 
-/** Length from the start to step i of all segments, [segments * STEPS + 1]. */
+/** Cumulative length up to each of the STEPS steps of all segments; [segments * STEPS + 1]. */
 static void measure(const pose_curve *c, double *length)
 {
     double before[DIMENSIONS], at[DIMENSIONS];
@@ -368,7 +375,8 @@ gbt_status camera_path_through(const gbt_camera *keys, size_t count, double turn
     return status;
 }
 
-/** Centre, and 2 L q with either sign: the nearer counts. Lenses do not: the way has one for all. */
+/** Distance of two poses, centre and 2 L q, with the nearer sign of q. Zoom does not count: one lens is used
+    for the whole path. */
 static double way_between(const gbt_camera *a, const gbt_camera *b, double turn_length)
 {
     double p[DIMENSIONS], q[DIMENSIONS];
@@ -397,8 +405,9 @@ gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_leng
             }
         }
         const gbt_camera next = nearest[best];
-        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the others keep their order:
-                                                                                ties go by name */
+        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the rest keep their order, so
+                                                                                that ties are resolved by name
+                                                                              */
         nearest[i] = next;
         to_nearest += least;
     }

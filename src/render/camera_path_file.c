@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/camera_path_file.c -- a camera path from a file: ours, or the one that nerfstudio's viewer saves. */
+/* render/camera_path_file.c -- read a camera path file: our own format, or the one that nerfstudio's viewer
+   saves. */
 #include "render/camera_path_file.h"
 
 #include <math.h>
@@ -15,9 +16,9 @@
 
 static const double rotation_tolerance = 1e-3, fps_most = 1000;
 
-/* ---- both ---- */
+/* ---- both formats ---- */
 
-/** Element i of the list called `field`, as an object to take fields from. */
+/** Element i of the array `field`, as an object whose fields can be taken. */
 static gbt_status element_of(const json_fields *root, const char *field, size_t i, char prefix[64],
                              json_fields *out)
 {
@@ -39,9 +40,10 @@ static gbt_status count_of(const json_fields *root, const char *field, size_t *c
     return GBT_OK;
 }
 
-/* ---- ours ---- */
+/* ---- our format ---- */
 
-/** A camera of the list: its own fields over those that stand beside the list for all. */
+/** A camera of the array. Fields beside the array are common to all cameras; the camera's own override them.
+ */
 static gbt_status take_camera(const json_fields *root, const json_t *common, size_t i, const double origin[3],
                               ray_shot *shot)
 {
@@ -115,13 +117,13 @@ static gbt_status take_cameras(const json_fields *root, const double origin[3], 
 
 /* ---- nerfstudio ---- */
 
-/* Its trainer turns, moves and scales the world: p' = scale (rotation p + move). */
+/* nerfstudio's trainer rotates, moves and scales the world: p' = scale (rotation p + move). */
 typedef struct similarity {
     double rotation[9], move[3], scale;
 } similarity;
 
-/** Rows of 4 numbers, as lists or one after the other: `rows` 3 x 4 of them into a rotation and what follows
-    it. */
+/** A matrix of `rows` x 4 numbers, as nested lists or as one flat list: its upper 3 x 3 part into `rotation`,
+    its last column into `move`. */
 static gbt_status take_matrix(const json_fields *r, const char *field, double rotation[9], double move[3])
 {
     const json_t *list = json_object_get(r->object, field);
@@ -148,8 +150,8 @@ static gbt_status take_similarity(const json_fields *r, similarity *out)
     return json_field_given(r, "transform") ? take_matrix(r, "transform", out->rotation, out->move) : GBT_OK;
 }
 
-/** From the path file itself, else from the file that nerfstudio's trainer leaves, beside it; else the world
-    is as it was. */
+/** The transform of the world: from the path file itself, else from the file of nerfstudio's trainer in the
+    same folder; without both, the identity. */
 static gbt_status find_similarity(const json_fields *root, similarity *out)
 {
     static const char name[] = "dataparser_transforms.json";
@@ -168,7 +170,7 @@ static gbt_status find_similarity(const json_fields *root, similarity *out)
     return status;
 }
 
-/** Camera to world in OpenGL's axes (x right, y up, z back) to a pose in the data set's world. */
+/** A camera-to-world matrix with OpenGL's axes (x right, y up, z back) to a pose in the data set's world. */
 static gbt_status take_pose(const json_fields *r, const similarity *s, const double origin[3],
                             gbt_camera *camera)
 {
@@ -183,8 +185,8 @@ static gbt_status take_pose(const json_fields *r, const similarity *s, const dou
     dmat_apply_transposed(s->rotation, up, up);
     dmat_apply_transposed(s->rotation, forward, forward);
     dmat_apply_transposed(s->rotation, at, at);
-    gbt_camera_look_at(zero, forward, up, camera); /* makes it orthonormal; cannot fail for what is nearly a
-                                                      rotation */
+    gbt_camera_look_at(zero, forward, up, camera); /* makes the rotation orthonormal; cannot fail for a matrix
+                                                      that is nearly a rotation */
     for (int k = 0; k < 3; k++)
         camera->center[k] = at[k] - origin[k];
     return GBT_OK;
@@ -205,7 +207,7 @@ static gbt_status take_lens(const json_fields *r, int type, gbt_camera *camera)
     }
     GBT_TRY(json_field_needed(r, "fov", "degrees from the top of the picture to the bottom"));
     GBT_TRY(json_field_number(r, "fov", 0, false, 179.9, &fov_deg));
-    /* a fisheye too: that is how its renderer reads it */
+    /* for fisheyes too, as nerfstudio's renderer does */
     camera->params[0] = camera->params[1] = 0.5 * camera->height / tan(fov_deg * PI / 360);
     camera->params[2] = 0.5 * camera->width;
     camera->params[3] = 0.5 * camera->height;
@@ -245,7 +247,7 @@ static gbt_status take_nerfstudio(const json_fields *root, const double origin[3
 
 /* ---- entry ---- */
 
-/** Cameras of the file become those of a smooth way through them. */
+/** Replace the cameras of the file by `frames` cameras of a smooth path through them. */
 static gbt_status smooth(const json_fields *root, size_t frames, camera_path *path)
 {
     GBT_TRY(check_alike(root, path, frames > 0));

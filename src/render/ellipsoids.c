@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/ellipsoids.c -- solid ellipsoids as a shaded picture. */
+/* render/ellipsoids.c -- render solid ellipsoids, shaded, with a depth buffer.
+
+   Every ellipsoid gets a screen-space bounding box; each ray inside it (four per pixel) is intersected with
+   the ellipsoid, and the nearest hit stays. Bands of rows run in parallel, so results do not depend on the
+   number of threads. */
 #include "render/ellipsoids.h"
 
 #include <math.h>
@@ -14,15 +18,17 @@
 enum { CHECK_SOLIDS = 1 << 12 };
 enum {
     FINE = 2 /* rays per pixel, in each direction */,
-    BAND = 16 /* rows of rays that are drawn together */
+    BAND = 16 /* rows of rays drawn by one task */
 };
 
-static const double rays_most = 1e9; /* that are tested against boxes in one drawing */
+static const double rays_most =
+    1e9; /* rays to intersect in one call, over all bounding boxes: a few seconds */
 
-/** One ellipsoid as its rays meet it: to_unit takes world differences to the unit sphere. */
+/** One ellipsoid, ready for intersection: to_unit maps world vectors into the space where it is the unit
+    sphere. */
 typedef struct solid {
     float center[3], to_unit[9], color[3];
-    int left, right, top, bottom; /* rays that may meet it, half open */
+    int left, right, top, bottom; /* bounding box in rays, half open */
 } solid;
 
 typedef struct drawing {
@@ -30,11 +36,11 @@ typedef struct drawing {
     const solid *solids;
     size_t count;
     int width, height; /* rays */
-    float *depth;      /* [height][width] along the ray; infinity: nothing */
+    float *depth;      /* [height][width], the ray parameter of the hit; infinity: no hit */
     float *color;      /* [height][width][3] */
 } drawing;
 
-/** Where on the camera's plane a point in camera axes is, in rays. */
+/** Project a point in camera axes into the picture, in units of rays. */
 static void project(const gbt_camera *c, double x, double y, double z, double out[2])
 {
     const double scale = c->model == GBT_CAMERA_PINHOLE ? 1 / z : 1;
@@ -42,10 +48,11 @@ static void project(const gbt_camera *c, double x, double y, double z, double ou
     out[1] = FINE * (c->params[1] * y * scale + c->params[3]);
 }
 
-/** Both limits, before it becomes an integer: what lies a billion units aside is beyond all of those. */
+/** Clamped before the conversion to int, which very distant ellipsoids would overflow. */
 static int clamp_ray(double at, int end) { return (int)fmin(fmax(at, 0), end); }
 
-/** False: it is behind the camera, around it, or beside the picture. */
+/** The bounding box; false if the ellipsoid is behind the camera, reaches its plane, or is outside the
+    picture. */
 static bool find_box(const gbt_camera *c, const double center[3], double radius, const drawing *d, solid *out)
 {
     double way[3], at[3], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
@@ -94,7 +101,8 @@ static bool make_solid(const ellipsoids *set, size_t i, const drawing *d, solid 
     for (int row = 0; row < 3; row++)
         for (int k = 0; k < 3; k++)
             out->to_unit[3 * row + k] =
-                turn[3 * k + row] / (float)fmax(axes[row], 1e-3 * radius); /* a flat one is still a solid */
+                turn[3 * k + row] /
+                (float)fmax(axes[row], 1e-3 * radius); /* a flat ellipsoid gets a small thickness */
     for (int k = 0; k < 3; k++) {
         out->center[k] = (float)center[k];
         out->color[k] = set->color[3 * i + (size_t)k];
@@ -110,8 +118,8 @@ static void apply(const float m[9], const float a[3], float out[3])
 
 static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-/** The ray of place (x, y), from the camera's plane; its direction is not unit for a pinhole, but the same
-    scale for all that it meets. */
+/** The ray through sample (x, y). A pinhole's direction is not unit length, but has depth 1, so that the ray
+    parameters of all hits can be compared. */
 static void make_ray(const gbt_camera *c, int x, int y, float origin[3], float dir[3])
 {
     const double u = ((x + 0.5) / FINE - c->params[2]) / c->params[0],
@@ -124,8 +132,7 @@ static void make_ray(const gbt_camera *c, int x, int y, float origin[3], float d
     }
 }
 
-/** Brightness of a surface: that of a lamp beside the camera, darker at the rim, so that neighbours of one
-    colour stay apart. */
+/** A headlight, darker towards the silhouette, so that neighbours of the same colour can be told apart. */
 static float shade(const solid *s, const float hit[3], const float dir[3])
 {
     float normal[3];
@@ -145,12 +152,12 @@ static void draw_row(const drawing *d, const solid *s, int y)
         apply(s->to_unit, from, o);
         apply(s->to_unit, dir, w);
         const float a = dot(w, w), b = dot(o, w);
-        float nearest[3]; /* the point of the ray nearest to the middle: |o|^2 - 1 would cancel */
+        float nearest[3]; /* the point of the ray nearest to the centre; |o|^2 - 1 would cancel */
         for (int k = 0; k < 3; k++)
             nearest[k] = o[k] - b / a * w[k];
         const float inside = 1.0f - dot(nearest, nearest), t = -b / a - sqrtf(fmaxf(inside, 0.0f) / a);
         float *depth = &d->depth[(size_t)y * (size_t)d->width + (size_t)x];
-        if (!(inside > 0.0f && t > 0.0f && t < *depth)) /* of equal ones the first stays */
+        if (!(inside > 0.0f && t > 0.0f && t < *depth)) /* of equal depths the first stays */
             continue;
         float hit[3];
         for (int k = 0; k < 3; k++)
@@ -173,7 +180,7 @@ static void draw_band(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/** The mean of each pixel's rays, over what is there. */
+/** The mean of each pixel's rays, composited over what `out` holds. */
 static void blend(const drawing *d, image *out)
 {
     for (int y = 0; y < out->height; y++) {
@@ -198,8 +205,8 @@ static void blend(const drawing *d, image *out)
     }
 }
 
-/** Solids that all cover the picture hide one another: of more than can be drawn in seconds every n-th stays.
- */
+/** Ellipsoids that all fill the picture would take minutes, and mostly hide one another: keep every n-th, so
+    that rays_most is not exceeded. */
 static void thin_out(solid *solids, size_t *count)
 {
     double rays = 0;

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert.c -- a picture of rays among Gaussians and the surfaces of meshes.
+/* render/insert.c -- render rays among Gaussians and inserted meshes (docs/inserting.md).
 
-   rays --> [nearest surface] --> Gaussians in front of it
-        --> darkened where a surface keeps the lamp from them
+   rays --> [nearest surface] --> trace the Gaussians in front of it
+        --> darken them where a mesh blocks the light
                   |
-                  +--> matt: a ray to the lamp, through surfaces and Gaussians
-                  +--> mirror: the reflected ray, seen the same way; behind BOUNCES_MAX mirrors one is matt */
+                  +--> matt surface: a shadow ray to the lamp, through meshes and Gaussians
+                  +--> mirror: the reflected ray, rendered in the same way; after BOUNCES_MAX mirrors the next
+   one counts as matt
+
+   All steps run over whole images of rays, so that the tracer can work on packets. */
 #include "render/insert_surface.h"
 
 #include <string.h>
@@ -16,23 +19,24 @@
 
 enum { RAY_BLOCK = 512, BOUNCES_MAX = 4 };
 
-/* No photo was taken from there: they see what is nearer than anything before a camera. */
+/* Secondary rays see Gaussians from this share of the near distance on. The near distance keeps the space in
+   front of the photos' cameras free, which does not apply to surfaces. */
 static const float surface_near_share = 0.1f;
 
-/* Arrays have a value per ray. */
+/* One level of recursion. Arrays have one element per ray. */
 typedef struct surface_pass {
     const insert_scene *in;
     const ray_image *rays;
-    int bounces; /* mirrors on the way here */
+    int bounces; /* mirrors on the way from the camera */
     insert_surface *surface;
     float *far, *transmittance, *depth;
     image *rgb;
     float background[3];
     sky sky;
-    ray_image next; /* to the lamp, or mirrored; a zero direction where there is none */
-    int sample;     /* of the lamp */
-    float *lamp_transmittance,
-        *lamp_light; /* of this sample; cosine times transmittance, summed over the samples so far */
+    ray_image next; /* secondary rays: shadow rays or reflected ones; direction 0 for pixels without one */
+    int sample;     /* of the lamp: index of the current one */
+    float *lamp_transmittance, *lamp_light; /* lamp_transmittance: of the current sample; lamp_light: cosine
+                                               times transmittance, summed over the samples so far */
     image next_rgb;
 } surface_pass;
 
@@ -52,8 +56,8 @@ static void find_surfaces(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* Gaussians carry the light of the day they were photographed in; what a surface takes of it is taken here,
-   for the whole ray at once, at the mean depth of what it meets. */
+/* Gaussians have the light of the photos baked in. Shadows that meshes cast on them are computed once per
+   ray, at the mean depth of the Gaussians that it crosses. */
 static void shadow_gaussians(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -104,8 +108,8 @@ static void mirror_rays(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/* The ray to sample s->sample of the lamp, for each matt surface that the lamp is in front of, with no
-   surface between them. */
+/* Shadow rays to sample s->sample of the lamp, for matt surfaces that face the lamp and have no mesh in
+   between. */
 static void lamp_rays(size_t block, size_t begin, size_t end, void *context)
 {
     (void)block;
@@ -128,7 +132,7 @@ static void add_lamp(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     surface_pass *s = context;
     for (size_t i = begin; i < end; i++) {
-        const float *n = s->surface[i].normal, *d = s->next.dir + 3 * i; /* zero for a surface in shadow */
+        const float *n = s->surface[i].normal, *d = s->next.dir + 3 * i; /* d is 0 for a surface in shadow */
         if (is_matt(s, i))
             s->lamp_light[i] += fmaxf(0, n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) * s->lamp_transmittance[i];
     }
@@ -260,7 +264,7 @@ static gbt_status shade(surface_pass *s, trace_scene *scene, gbt_error *err)
     const size_t count = ray_image_count(s->rays);
     GBT_TRY(allocate(s, err));
     parallel_blocks(count, RAY_BLOCK, find_surfaces, s);
-    ray_image ended = *s->rays; /* the same rays; only their ends are ours */
+    ray_image ended = *s->rays; /* a view of the same rays, with the surfaces as their ends */
     ended.far = s->far;
     GBT_TRY(trace_forward(
         scene, &ended, false,
@@ -279,7 +283,8 @@ static gbt_status shade(surface_pass *s, trace_scene *scene, gbt_error *err)
 gbt_status insert_trace(void *context, trace_scene *scene, const ray_image *rays, image *rgb, gbt_error *err)
 {
     surface_pass s = {.in = context, .rays = rays, .rgb = rgb};
-    /* A surface hides the background, so it is not added before that is known. */
+    /* The tracer must not add the background, which a surface may hide; add_background() adds it where it is
+     * seen. */
     memcpy(s.background, scene->settings.background, sizeof s.background);
     memset(scene->settings.background, 0, sizeof scene->settings.background);
     s.sky = scene->settings.sky;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_file.c -- an insert file: meshes to put into a scene, in JSON. */
+/* render/insert_file.c -- read an insert file: JSON that names meshes to put into a scene, and a lamp. */
 #include "render/insert_file.h"
 
 #include <stdio.h>
@@ -43,7 +43,7 @@ static gbt_status take_lamp(const json_fields *all, const double origin[3], inse
     return GBT_OK;
 }
 
-/* From a mesh's own coordinates to scene-local ones: x -> turn (scale x) + position. */
+/* From the mesh's coordinates to scene-local ones: x -> turn (scale x) + position. */
 typedef struct placement {
     double scale, turn[9], position[3];
 } placement;
@@ -132,7 +132,7 @@ static gbt_status take_all(const json_fields *all, const double origin[3], inser
     const json_t *objects = json_object_get(all->object, "objects");
     GBT_TRY(json_field_names(all, " objects light "));
     GBT_TRY(take_lamp(all, origin, out));
-    const size_t count = json_array_size(objects); /* 0 for what is no array */
+    const size_t count = json_array_size(objects); /* 0 if it is not an array */
     if (count == 0 || count > OBJECTS_MAX)
         return base_fail(all->err, GBT_ERR_FORMAT, "%s: objects: wanted a list of 1 to %d objects", all->path,
                          OBJECTS_MAX);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_file.h -- an insert file: meshes to put into a scene, and the lamp that shines on them, in
-   JSON. */
+/* render/insert_file.h -- read an insert file: JSON that names meshes to put into a scene, and a lamp. */
 #ifndef GBT_RENDER_INSERT_FILE_H
 #define GBT_RENDER_INSERT_FILE_H
 
@@ -8,10 +7,9 @@
 
 /**
  * Read an insert file and the meshes that it names. Fields, units and defaults: docs/inserting.md. Every
- * field is checked, and a field of another name is an error.
+ * field is checked, and an unknown field is an error.
  *
- * @param origin [in]  the scene's local origin: subtracted, in double, from what the file says in the data
- *                     set's own coordinates
+ * @param origin [in]  the scene's local origin; subtracted, in double, from the file's world coordinates
  * @param out    [out] finished; free with insert_scene_free() after success or failure
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE: field: what was wrong"), GBT_ERR_NO_MEMORY,
  *         GBT_ERR_INTERNAL

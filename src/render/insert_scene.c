@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_scene.c -- the inserted objects: their triangles in one tree, their vertex normals. */
+/* render/insert_scene.c -- collect the inserted objects: all triangles in one tree, and vertex normals. */
 #include "render/insert_surface.h"
 
 #include <math.h>
@@ -67,7 +67,8 @@ gbt_status insert_finish(insert_scene *in, gbt_error *err)
     float largest = 0;
     for (size_t i = 0; i < 3 * in->vertex_count; i++)
         largest = fmaxf(largest, fabsf(in->vertices[i]));
-    in->offset_min = largest * 0x1p-40f; /* near 0; where a mesh is met is exact to about 2^-50 of its size */
+    in->offset_min = largest * 0x1p-40f; /* for points near 0, where the relative offset vanishes; hit points
+                                            are exact to about 2^-50 of the mesh's size */
     in->reach = largest * (1 + 2 * INSERT_OFFSET_SHARE);
     return mesh_tree_build(in->vertices, in->vertex_count, in->triangles, in->triangle_count, &in->tree, err);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/insert_surface.c -- the surface that a ray meets; the rays from there to the lamp and out of a
- * mirror. */
+/* render/insert_surface.c -- the surface that a ray meets, and the shadow rays and reflected rays that leave
+   it. */
 #include "render/insert_surface.h"
 
 #include <math.h>
@@ -53,12 +53,11 @@ int insert_lamp_samples(const insert_scene *in)
                                                                   : 1;
 }
 
-/* Point `sample` of the disc that the lamp is seen as: a sunflower's spiral, turned by another angle for each
-   ray. */
+/* Move the target to point `sample` of the disc as which the lamp is seen: a sunflower spiral (Vogel 1979),
+   which covers the disc evenly, rotated by a random angle per ray. */
 static void move_over_lamp(const insert_scene *in, int sample, size_t ray, const double dir[3],
                            double to_lamp[3])
 {
-    /* Even over the disc (Vogel 1979). */
     const double angle = GOLDEN_ANGLE * sample + 2 * PI * (double)rng_uniform(LAMP_SEED, 0, ray);
     const double radius = in->lamp_radius * sqrt((sample + 0.5) / INSERT_LAMP_SAMPLES),
                  any[3] = {fabs(dir[0]) < 0.6, fabs(dir[0]) >= 0.6, 0};
@@ -105,8 +104,8 @@ void insert_reflect(const insert_surface *s, const float dir[3], float out[3])
             r[k] = d[k] - along * normal[k];
         if (dvec_dot(r, flat) > 0)
             break;
-        memcpy(normal, flat, sizeof normal); /* an interpolated normal may send the ray into the surface; the
-                                                triangle's own does not */
+        memcpy(normal, flat, sizeof normal); /* with an interpolated normal the reflected ray may point into
+                                                the surface; with the triangle's own normal it cannot */
     }
     dvec_normalize(r);
     for (int k = 0; k < 3; k++)

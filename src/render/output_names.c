@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/output_names.c -- the names of outputs, and lists of them. */
+/* render/output_names.c -- names of the outputs beside colour, and parsing of lists of them. */
 #include "render/output_names.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/output_names.h -- what a picture can show beside colour: names, and lists of them. */
+/* render/output_names.h -- names of the outputs beside colour, and parsing of lists of them. */
 #ifndef GBT_RENDER_OUTPUT_NAMES_H
 #define GBT_RENDER_OUTPUT_NAMES_H
 
@@ -21,11 +21,11 @@ extern const struct render_output_kind {
 } render_output_kinds[OUTPUT_COUNT];
 
 /**
- * A list of names with commas between: transmittance, depth, median-depth, normal, hits, anchor.
+ * Parse a comma-separated list of: transmittance, depth, median-depth, normal, hits, anchor.
  *
  * @param list   [in]  NULL: none
- * @param wanted [out] a bit for each
- * @return GBT_OK, or GBT_ERR_ARGUMENT for another name
+ * @param wanted [out] one bit per output
+ * @return GBT_OK, or GBT_ERR_ARGUMENT for an unknown name
  */
 gbt_status render_outputs_parse(const char *list, unsigned *wanted, gbt_error *err);
 

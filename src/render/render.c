@@ -1,5 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/render.c -- the views of a split, the camera of a file, or a path, to image files or a film. */
+/* render/render.c -- gbt_render(): views of the data set, a camera file, or a path, to image files or a film.
+
+        open_run() --> choose_renderer() --> render_views() | render_camera() | render_film()
+                                                 each picture: draw() --> write_one(), or a frame of the film
+
+   With several processes, pictures are distributed over them. A scene larger than memory is drawn cell by
+   cell; then all processes may work on one picture together (deal_out()). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -33,7 +39,7 @@ gbt_render_def gbt_render_def_default(void)
                             .cookie_ = DEF_COOKIE};
 }
 
-/* Same Gaussians, same rays, in double: the picture that the tracer is measured against. */
+/* The same Gaussians and rays in double: the reference image for the tracer. */
 static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_error *err)
 {
     frame *f = &r->frame;
@@ -56,17 +62,17 @@ static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_erro
     return status;
 }
 
-/* What to render with: the run, and what is put into it. */
+/* The open run, what is inserted into it, and how it is drawn. */
 typedef struct studio {
     loaded_run run;
     insert_scene insert;
-    unsigned outputs; /* render_outputs_parse() */
-    bool in_double;   /* by the reference */
-    bool together;    /* deal_out() */
+    unsigned outputs; /* bits of render_outputs_parse() */
+    bool in_double;   /* by the double-precision reference */
+    bool together;    /* all processes draw each picture: deal_out() */
 } studio;
 
-/* Pictures are dealt out to the processes. When there are fewer of them, what is larger than memory all draw
-   together, each some of its cells. */
+/* Distribute pictures over the processes. If there are fewer pictures than processes and the scene is drawn
+   by cells, all processes draw each picture together, each some of its cells. */
 static void deal_out(studio *st, size_t pictures)
 {
     st->together = st->run.cells.count > 0 && pictures < (size_t)gbt_cluster_size();
@@ -77,7 +83,7 @@ static bool is_own(const studio *st, size_t index)
     return st->together || index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank();
 }
 
-/* Into run.frame.rgb. */
+/* Render into run.frame.rgb. */
 static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
 {
     loaded_run *r = &st->run;
@@ -93,7 +99,8 @@ static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *d
     return GBT_OK;
 }
 
-/* What is drawn whole is drawn, and then it is said how much that took. */
+/* A scene that is not drawn by cells is drawn in full even if it exceeds the memory limit; only afterwards is
+   the excess reported. */
 static gbt_status check_memory(const studio *st, const gbt_render_def *def, gbt_error *err)
 {
     const size_t peak = mem_peak_bytes();
@@ -223,7 +230,7 @@ static void warn_of_older_frames(size_t count, const char *out, const gbt_render
         log_warn("%s: frames from %zu on are of an earlier film", out, count + 1);
 }
 
-/* The frame that process `from` has drawn last goes to the first one. */
+/* Send the frame that process `from` drew last to the first process. */
 static void collect_frame(const image *own, size_t from, image *out)
 {
     size_t send[CLUSTER_SIZE_MAX] = {0}, receive[CLUSTER_SIZE_MAX] = {0};
@@ -233,8 +240,8 @@ static void collect_frame(const image *own, size_t from, image *out)
     cluster_exchange(own->pixels, send, out->pixels, receive);
 }
 
-/* A film is written in its order by the first process; in each round every process draws a frame, or all draw
-   one. `picture`: room for a frame. */
+/* The first process writes the film, in order. In each round every process draws one frame, or all draw one
+   together. `picture`: space for one frame. */
 static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *picture,
                               const gbt_render_def *def, gbt_error *err)
 {
@@ -295,7 +302,7 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
 
 static const char insert_is_traced[] = "insert: meshes are traced (wanted the renderer trace)";
 
-/* What draws the model that is open. */
+/* Choose the renderer for the open model, and check that it can do what was asked for. */
 static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_error *err)
 {
     gbt_renderer *renderer = &st->run.frame.draw.renderer;
@@ -373,7 +380,7 @@ static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_erro
     return check_path(out, def, err);
 }
 
-/* The folder that pictures or a film go to. */
+/* The folder that the pictures or the film are written to. */
 static void folder_of(const char *out, char folder[4096])
 {
     const char *slash = strrchr(out, '/');
@@ -385,7 +392,7 @@ static void folder_of(const char *out, char folder[4096])
         snprintf(folder, 4096, "%.*s", (int)(slash == out ? 1 : slash - out), out);
 }
 
-/* The model, and its views where they are wanted; by cells where memory is short. */
+/* Open the model, with its views if they are needed; as cells if it exceeds the memory limit. */
 static gbt_status open_run(const char *run, const char *out, const gbt_render_def *def, loaded_run *r,
                            gbt_error *err)
 {
@@ -401,7 +408,7 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
             "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
             "trace, no outputs, no meshes)");
     if (large)
-        GBT_TRY(file_make_folder(folder, err)); /* for the temporary file */
+        GBT_TRY(file_make_folder(folder, err)); /* for the cells' temporary file */
     if (large)
         GBT_TRY(loaded_run_open_cells(run, def->memory, folder, r, err));
     if (large)
@@ -410,7 +417,8 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
                             : loaded_run_open_model(run, r, err);
 }
 
-/* The scored pictures of a run with exposures went through colour matrices, what is drawn here does not. */
+/* A run with exposures keeps its scored pictures in renders/test, after the photos' colour matrices. Pictures
+   drawn here lack these, so they must not overwrite them. */
 static gbt_status check_scored(const loaded_run *r, const char *out, const gbt_render_def *def,
                                gbt_error *err)
 {
@@ -445,7 +453,7 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         status = choose_renderer(st, def, err);
     if (status == GBT_OK && def->insert != NULL)
         status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
-    if (status == GBT_OK && !video_named(out)) /* not before it is known that there is something to draw */
+    if (status == GBT_OK && !video_named(out)) /* only now is it known that there is something to draw */
         status = file_make_folder(out, err);
     status = cluster_agree(status, err);
     if (status == GBT_OK)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/render_outputs.c -- what a picture shows beside colour, to float EXR files. */
+/* render/render_outputs.c -- outputs beside colour (depth, normal, ...) as float EXR files. */
 #include "render/render_outputs.h"
 
 #include <stdio.h>
@@ -9,8 +9,8 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-/* The anchor that each ray's strongest Gaussian was decoded from, or the plain Gaussian; -1 where there is
-   none. */
+/* For each ray the anchor (or plain Gaussian) that its strongest Gaussian comes from; -1 where there is none.
+ */
 static void name_anchors(const loaded_run *r, const uint32_t *strongest, image *out)
 {
     const frame *f = &r->frame;

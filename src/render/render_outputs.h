@@ -1,21 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/render_outputs.h -- what a picture shows beside colour, to float EXR files: see docs/formats.md. */
+/* render/render_outputs.h -- outputs beside colour (depth, normal, ...) as float EXR files: docs/formats.md.
+ */
 #ifndef GBT_RENDER_RENDER_OUTPUTS_H
 #define GBT_RENDER_RENDER_OUTPUTS_H
 
 #include "render/output_names.h"
 #include "run/loaded_run.h"
 
-/** Pictures of one pass. Start from {0}; render_output_images_free() after success or failure. */
+/** Images of one pass. Start from {0}; free with render_output_images_free() after success or failure. */
 typedef struct render_output_images {
     ray_image rays;
-    image rgb, of[OUTPUT_COUNT]; /* those that were wanted */
+    image rgb, of[OUTPUT_COUNT]; /* of[k]: only the requested ones */
     uint32_t *strongest;
 } render_output_images;
 
 /**
- * Trace the Gaussians of the last render of `r` once more, along the rays of `shot` through the middle of its
- * aperture. They may be others than the render's, but see nothing more: what was left out then is not seen.
+ * Trace the Gaussians of the last render of `r` once more, along the rays of `shot` through the centre of its
+ * aperture. The rays may differ from that render's, but Gaussians that were culled for it stay invisible.
  *
  * @param wanted [in] bits of render_outputs_parse()
  * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_NO_MEMORY
@@ -25,13 +26,13 @@ gbt_status render_outputs_trace(loaded_run *r, const ray_shot *shot, unsigned wa
 void render_output_images_free(render_output_images *out); /* zeroes the struct */
 
 /**
- * Trace the Gaussians of the last render of `r` once more and write FOLDER/NAME.OUTPUT.exr for each wanted
+ * Trace the Gaussians of the last render of `r` once more and write FOLDER/NAME.OUTPUT.exr for each requested
  * output.
  *
- * The rays are those of `shot` through the middle of its aperture: a depth that is the mean over an aperture
- * means nothing.
+ * The rays are those of `shot` through the centre of its aperture: a mean depth over the aperture would be
+ * meaningless.
  *
- * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_NO_MEMORY. Nothing to do when nothing is wanted.
+ * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_NO_MEMORY. Does nothing if no output is requested.
  */
 gbt_status render_outputs_write(loaded_run *r, const ray_shot *shot, unsigned wanted, const char *folder,
                                 const char *name, gbt_error *err);

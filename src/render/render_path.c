@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/render_path.c -- which cameras a film has. */
+/* render/render_path.c -- choose the cameras of a film: an orbit, the photos' cameras, or a path file. */
 #include "render/render_path.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@ bool render_path_wants_views(const char *path)
     return strcmp(path, "orbit") == 0 || strcmp(path, "interpolate") == 0;
 }
 
-/** The cameras that photos were trained on; all where every photo was held out. */
+/** The cameras of the training photos; if every photo is held out, those of all photos. */
 static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *count, gbt_error *err)
 {
     *count = 0;
@@ -35,7 +35,8 @@ static gbt_status take_cameras(const loaded_run *r, gbt_camera **out, size_t *co
                                   r->scene.folder);
 }
 
-/** Sides of the pictures: as asked for, else those of the first photo, made even for films. */
+/** Size of the pictures: as requested, else that of the first photo, rounded down to even numbers for video.
+ */
 static gbt_camera choose_lens(const camera_group *group, const gbt_render_def *def)
 {
     if (def->width > 0)
@@ -44,7 +45,7 @@ static gbt_camera choose_lens(const camera_group *group, const gbt_render_def *d
     return camera_group_lens(group, width > 1 ? width & ~1 : width, height > 1 ? height & ~1 : height);
 }
 
-/** "X,Y,Z" of the data set to a place of the scene. */
+/** "X,Y,Z" in the data set's coordinates to a scene-local position. */
 static gbt_status read_place(const char *text, const double origin[3], double out[3], gbt_error *err)
 {
     const char *at = text;
@@ -60,7 +61,8 @@ static gbt_status read_place(const char *text, const double origin[3], double ou
     return GBT_OK;
 }
 
-/** What is not asked for follows the cameras; then what most photos show is in every frame. */
+/** Whatever def leaves open follows the photos' cameras. If it leaves everything open, the lens is widened
+    until what most photos show is in every frame. */
 static gbt_status make_orbit(const loaded_run *r, const gbt_render_def *def, const gbt_camera *cameras,
                              size_t count, const shared_points *shared, camera_group *group, camera_path *out,
                              gbt_error *err)
@@ -115,7 +117,7 @@ done:
     return status;
 }
 
-/** A file's cameras for pictures of another size: its shorter side sees as much as before. */
+/** Set the size of a path file's cameras; the field of view across the shorter side stays. */
 static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error *err)
 {
     for (size_t i = 0; i < path->count; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* render/video.c -- pictures to a film, by the program ffmpeg. */
+/* render/video.c -- write pictures into a film by running ffmpeg. */
 #include "render/video.h"
 
 #include <errno.h>
@@ -20,12 +20,13 @@
 
 enum { ARGUMENTS_MAX = 48 };
 
-/* By itself ffmpeg converts by BT.601 and does not say so in the file; players take that for BT.709. */
+/* By default ffmpeg converts to YUV by BT.601 without recording it in the file; players then assume BT.709.
+ */
 #define AS_BT709                                                                                             \
     "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709", \
         "-color_trc", "bt709", "-color_range", "tv"
 
-/* What ffmpeg is told for each kind of file. -f: the temporary name does not say it. */
+/* ffmpeg's options by file type. -f is needed because the temporary file's name does not end in the type. */
 static const struct {
     const char *ending, *options[24];
 } kinds[] = {
@@ -35,17 +36,17 @@ static const struct {
     {".webm",
      {"-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "28", "-row-mt", "1", "-pix_fmt", "yuv420p", AS_BT709, "-f",
       "webm"}},
-    {".gif", /* colours for each picture: ffmpeg would keep a whole film to find colours for all */
+    {".gif", /* a palette per picture: one for the whole film would make ffmpeg keep all pictures in memory */
      {"-filter_complex", "[0:v]split[a][b];[a]palettegen=stats_mode=single[p];[b][p]paletteuse=new=1",
       "-loop", "0", "-f", "gif"}},
 };
 enum { KINDS = sizeof kinds / sizeof *kinds };
 
 struct video {
-    large_file film; /* ffmpeg writes it, by its name */
+    large_file film; /* ffmpeg opens it by its temporary name */
     int width, height;
-    int pictures;       /* socket to ffmpeg; -1: closed */
-    FILE *complaints;   /* what ffmpeg says */
+    int pictures;       /* socket to ffmpeg's standard input; -1: closed */
+    FILE *complaints;   /* ffmpeg's error output */
     pid_t process;      /* 0: none */
     unsigned char *row; /* one picture, [height][width][3] */
 };
@@ -87,8 +88,8 @@ static gbt_status missing(const video *v, gbt_error *err)
         v->film.name);
 }
 
-/** posix_spawnp() with a socket as standard input. A pipe would raise SIGPIPE in the whole program when
-    ffmpeg ends early. */
+/** posix_spawnp() with a socket as standard input: writing to a pipe after ffmpeg has ended early would raise
+    SIGPIPE in the whole process. */
 static gbt_status start(video *v, char *const *arguments, gbt_error *err)
 {
     int ends[2];
@@ -118,7 +119,7 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: not the name of a film (wanted .mp4, .webm or .gif)",
                          path);
     const bool gif = strcmp(kinds[kind].ending, ".gif") == 0;
-    if (gif && fps > 50) /* players take its shortest delay, 1/100 s, for a long one */
+    if (gif && fps > 50) /* players treat its shortest delay, 1/100 s, as a long one */
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: %g frames per second (wanted at most 50 in a .gif)",
                          path, fps);
     if (!gif && (width % 2 != 0 || height % 2 != 0))
@@ -139,9 +140,10 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
         return GBT_ERR_NO_MEMORY;
     if (v->complaints == NULL)
         return base_fail(err, GBT_ERR_IO, "%s: no temporary file: %s", path, strerror(errno));
-    const char *made = v->film.temporary[0] != '\0' ? v->film.temporary : path; /* streams have none */
+    const char *made =
+        v->film.temporary[0] != '\0' ? v->film.temporary : path; /* streams have no temporary file */
     char name[LARGE_FILE_NAME + 2], size[32], rate[32];
-    /* ./: a name that begins with a dash is no option, and what stands before a colon no protocol. */
+    /* "./" keeps ffmpeg from reading a leading dash as an option, or text before a colon as a protocol. */
     snprintf(name, sizeof name, "%s%s", made[0] == '/' ? "" : "./", made);
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", fps);
@@ -176,7 +178,7 @@ gbt_status video_open(const char *path, int width, int height, double fps, video
     return GBT_OK;
 }
 
-/** Close the socket and wait; the exit code, or 128 and the signal. */
+/** Close the socket and wait for ffmpeg. Returns the exit code, or 128 plus the signal number. */
 static int finish(video *v)
 {
     int state = 0;
@@ -186,7 +188,7 @@ static int finish(video *v)
     if (v->process == 0)
         return 0;
     while (waitpid(v->process, &state, 0) < 0)
-        if (errno != EINTR) { /* nobody knows how it ended */
+        if (errno != EINTR) { /* its exit status is unknown */
             state = 255 << 8;
             break;
         }
@@ -197,7 +199,7 @@ static int finish(video *v)
 static gbt_status failed(video *v, int code, gbt_error *err)
 {
     char line[200], last[200] = "it said nothing";
-    if (code == NOT_STARTED) /* where posix_spawnp() cannot say so */
+    if (code == NOT_STARTED) /* where posix_spawnp() itself cannot report it */
         return missing(v, err);
     rewind(v->complaints);
     while (fgets(line, sizeof line, v->complaints) != NULL) {
@@ -216,7 +218,8 @@ gbt_status video_add(video *v, const image *picture, gbt_error *err)
     const size_t count = 3 * (size_t)v->width * (size_t)v->height;
     for (size_t i = 0; i < count; i++) {
         const float value = picture->pixels[i];
-        v->row[i] = value > 0.0f ? (unsigned char)(fminf(value, 1.0f) * 255.0f + 0.5f) : 0; /* NaN is 0 */
+        v->row[i] =
+            value > 0.0f ? (unsigned char)(fminf(value, 1.0f) * 255.0f + 0.5f) : 0; /* NaN becomes 0 */
     }
     for (size_t done = 0; done < count;) {
         const ssize_t put = send(v->pictures, v->row + done, count - done, MSG_NOSIGNAL);

@@ -21,8 +21,8 @@ enum {
     BAND = 16 /* rows of rays drawn by one task */
 };
 
-static const double rays_most =
-    1e9; /* rays to intersect in one call, over all bounding boxes: a few seconds */
+/* Rays to intersect in one call, summed over all bounding boxes: a few seconds. */
+static const double rays_most = 1e9;
 
 /** One ellipsoid, ready for intersection: to_unit maps world vectors into the space where it is the unit
     sphere. */

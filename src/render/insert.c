@@ -5,10 +5,10 @@
         --> darken them where a mesh blocks the light
                   |
                   +--> matt surface: a shadow ray to the lamp, through meshes and Gaussians
-                  +--> mirror: the reflected ray, rendered in the same way; after BOUNCES_MAX mirrors the next
-   one counts as matt
+                  +--> mirror: the reflected ray, rendered in the same way
 
-   All steps run over whole images of rays, so that the tracer can work on packets. */
+   After BOUNCES_MAX mirrors the next mirror counts as matt. All steps run over whole images of rays, so that
+   the tracer can work on packets. */
 #include "render/insert_surface.h"
 
 #include <string.h>

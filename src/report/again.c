@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/again.c -- make the page of a run again, from what the run left. */
+/* report/again.c -- write the page of a finished run again, from the files that the run left. */
 #include <jansson.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +17,7 @@
 
 static size_t count_or_zero(double value) { return value >= 1 && value < 1e15 ? (size_t)value : 0; }
 
-/** Scores as metrics.json has them, with the pictures that scoring left. */
+/** Read the scores back from metrics.json, with the pictures that scoring left. */
 static gbt_status read_scores(const char *run, const json_t *metrics, evaluation *e, gbt_error *err)
 {
     char folder[4096];
@@ -45,7 +45,7 @@ static gbt_status read_scores(const char *run, const json_t *metrics, evaluation
         const char *picture = metrics_text(view, "picture");
         if (picture != NULL && strchr(picture, '/') == NULL)
             snprintf(v->file, sizeof v->file, "%s", picture);
-        else /* as older versions wrote it */
+        else /* as older versions named it */
             loaded_run_file_name(name, v->file);
         v->psnr = metrics_number(view, "psnr");
         v->ssim = metrics_number(view, "ssim");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/bars.c -- what a whole is made of, as inline SVG: bars, and layers over time. */
+/* report/bars.c -- the parts of a whole as inline SVG: a bar chart, and a stacked area chart over time. */
 #include <math.h>
 #include <stdio.h>
 
@@ -62,10 +62,10 @@ enum { STEPS = 60, LAYERS_MAX = 16 };
 
 typedef struct stack {
     size_t count, layer_count;
-    double x[STEPS], top[LAYERS_MAX + 1][STEPS]; /* top[k]: of layer k - 1; top[0] is 0 */
+    double x[STEPS], top[LAYERS_MAX + 1][STEPS]; /* top[k + 1]: upper edge of layer k; top[0] is 0 */
 } stack;
 
-/** Means of neighbouring rows; a step where nothing was measured is left out. */
+/** Average neighbouring rows into at most STEPS steps. Steps without a complete row are left out. */
 static void average(const double *x, size_t count, const chart_layer *layers, size_t layer_count, stack *s)
 {
     const size_t per_step = (count + STEPS - 1) / STEPS;
@@ -110,7 +110,7 @@ void chart_stack(text *out, const char *title, const char *x_unit, const char *y
     stack s;
     char x_label[64];
     average(x, count, layers, layer_count, &s);
-    if (s.count == 1) { /* a single row is the mean of all the time before it */
+    if (s.count == 1) { /* a single row is the mean over all the time before it */
         s.x[1] = s.x[0], s.x[0] = 0;
         for (size_t k = 0; k <= s.layer_count; k++)
             s.top[k][1] = s.top[k][0];

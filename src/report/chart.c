@@ -15,7 +15,7 @@ static void draw_dot(text *out, const plot *p, int color, double x, double y)
                 plot_y(p, y));
 }
 
-/* Of one point there is no line: a dot. */
+/* A single point has no line: draw a dot. */
 static void draw_line(text *out, const chart_series *line, const plot *p)
 {
     const size_t per_point = (line->count + PATH_POINTS - 1) / PATH_POINTS;
@@ -32,7 +32,7 @@ static void draw_line(text *out, const chart_series *line, const plot *p)
                 y += line->y[j];
                 n++;
             }
-        if (n == 0) /* a gap (a score between two rows) is bridged */
+        if (n == 0) /* gaps (a score between two rows) are bridged */
             continue;
         last_x = x / n, last_y = y / n;
         plot_line_to(out, p, &is_open, last_x, last_y);
@@ -94,8 +94,8 @@ static void add_readout(text *out, const line_chart *c, const plot *p, double x)
     }
 }
 
-/** Invisible columns over the plot; the one under the pointer shows a guide and the values there (a tap does
-    it on a phone). */
+/** Invisible strips over the plot: the one under the pointer shows a guide line and the values there. On a
+    phone a tap does the same. */
 static void draw_strips(text *out, const line_chart *c, const plot *p)
 {
     const double width = (double)(CHART_RIGHT - CHART_LEFT) / STRIPS;
@@ -131,7 +131,7 @@ static void draw_legend(text *out, const line_chart *c)
     text_add(out, "</p>");
 }
 
-/* Axes that end at round numbers; x starts at 0 (the run does) and ends with the values. */
+/* The y axis ends at round numbers; x goes from 0, the start of the run, to the last value. */
 static bool find_plot(const line_chart *c, const char *x_label, plot *p)
 {
     *p = (plot){.left = CHART_LEFT,
@@ -170,7 +170,7 @@ void chart_lines(text *out, const line_chart *c)
     text_escaped(out, c->title);
     text_add(out, " over training time\">");
     plot_draw_axes(out, &p);
-    for (int pass = 0; pass < 2; pass++) /* what is faint lies below */
+    for (int pass = 0; pass < 2; pass++) /* faint series first, below the others */
         for (size_t s = 0; s < c->series_count; s++)
             if (c->series[s].count > 0 &&
                 (pass == 0 ? c->series[s].style == CHART_FAINT : c->series[s].style == CHART_LINE))

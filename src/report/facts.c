@@ -43,7 +43,7 @@ static void add_machine(text *out, const json_t *metrics)
     text_add(out, "</tbody></table></div>\n");
 }
 
-/** "50,50,...": what --pace takes. False, with nothing added, unless it is a whole list of counts. */
+/** "50,50,...", the argument of --pace. False, with nothing added, unless it is a complete list of counts. */
 static bool add_pace(text *out, const json_t *metrics)
 {
     const json_t *pace = json_object_get(metrics, "pace");
@@ -81,7 +81,7 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
         report_number_row(out, "Photos made smaller by a factor of", downscale, 3, "");
     report_text_row(out, "Held-out split", metrics_text(metrics, "eval_split"));
     report_count_row(out, "Held-out views", (double)e->view_count);
-    if (metrics_text(metrics, "seed") != NULL) /* beyond JSON's whole numbers */
+    if (metrics_text(metrics, "seed") != NULL) /* saved as text because it exceeds JSON's integers */
         report_text_row(out, "Seed", metrics_text(metrics, "seed"));
     else
         report_number_row(out, "Seed", metrics_number(metrics, "seed"), 0, "");
@@ -92,7 +92,7 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
     text_add(out, "</tbody></table></div>\n");
 }
 
-/** "key = value" lines as rows. */
+/** Lines "key = value" as table rows. */
 static void add_settings(text *out, const char *settings)
 {
     text_add(out, "<details class=\"card\"><summary>All settings</summary><table class=\"facts\"><tbody>\n");
@@ -133,7 +133,7 @@ void report_again(text *out, const char *run, const json_t *metrics)
     char config[4096], word[8192];
     snprintf(config, sizeof config, "%s/config", run);
     text_add(out, "</main>\n<footer id=\"again\">\n<h2>Make it again</h2>\n");
-    if (file_exists(config)) { /* imported models have none */
+    if (file_exists(config)) { /* imported models have no config file */
         text_add(
             out,
             "<p>A time budget decides only how many steps there are. With the pace that this run "

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/facts.h -- the tables of a run's page: counts, speed, machine, settings, and how to make the run
-   again. */
+/* report/facts.h -- the tables of a run's page: counts, speed, machine, settings, and the commands that
+   repeat the run. */
 #ifndef GBT_REPORT_FACTS_H
 #define GBT_REPORT_FACTS_H
 
@@ -9,7 +9,7 @@
 #include "eval/scores.h"
 #include "report/text.h"
 
-/** Add the section "Facts". `settings`: "key = value" lines; NULL: not known. */
+/** Add the section "Facts". `settings`: lines "key = value"; NULL: unknown. */
 void report_facts(text *out, const evaluation *e, const json_t *metrics, const char *settings);
 
 /** Add the section "Make it again". */

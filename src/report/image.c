@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/image.c -- pictures inside the page: files to base64 JPEG, errors to colours. */
+/* report/image.c -- pictures inside the page: files as base64 JPEG, errors as colours. */
 #include "report/image.h"
 
 #include <math.h>
@@ -35,14 +35,15 @@ static bool is_in_gamut(const double rgb[3])
 
 void error_color(double error, float rgb[3])
 {
-    /* degrees: violet, red, yellow */
+    /* hue in degrees: from violet over red to yellow */
     static const double lightness_low = 0.09, lightness_high = 0.97, hue_low = 288, hue_high = 465,
                         chroma_most = 0.19;
-    const double t = error > 0 ? fmin(error, 1) : 0; /* NaN is 0 */
+    const double t = error > 0 ? fmin(error, 1) : 0; /* NaN becomes 0 */
     const double lightness = lightness_low + (lightness_high - lightness_low) * t;
     const double hue = (hue_low + (hue_high - hue_low) * t) * (PI / 180);
     double low = 0, high = chroma_most, linear[3];
-    for (int i = 0; i < 30; i++) { /* the strongest colour of this lightness and hue that a screen can show */
+    for (int i = 0; i < 30; i++) { /* bisect for the largest chroma at this lightness and hue that sRGB can
+                                      show */
         const double middle = 0.5 * (low + high);
         oklab_to_linear(lightness, middle, hue, linear);
         *(is_in_gamut(linear) ? &low : &high) = middle;
@@ -54,7 +55,7 @@ void error_color(double error, float rgb[3])
     }
 }
 
-/** The mean of factor x factor pixels as three channels. */
+/** Box filter: the mean of factor x factor pixels, as three channels. */
 static void shrink(const image *from, int factor, picture_kind kind, image *to)
 {
     float colors[COLORS][3];
@@ -87,7 +88,7 @@ static int shrink_factor(int width, int height, size_t most)
     int factor = (longest + LONGEST_SIDE - 1) / LONGEST_SIDE;
     while (factor < shortest && (size_t)(width / factor) * (size_t)(height / factor) > most)
         factor++;
-    return factor <= shortest ? factor : shortest; /* a strip keeps one row */
+    return factor <= shortest ? factor : shortest; /* a narrow strip keeps at least one row */
 }
 
 static void add_uri(text *out, const char *type, unsigned char *bytes, size_t count)
@@ -97,7 +98,7 @@ static void add_uri(text *out, const char *type, unsigned char *bytes, size_t co
     mem_free(bytes);
 }
 
-/** The JPEG of a picture, averaged down; its size in *small. */
+/** A picture as JPEG, scaled down if it is too large; *small gets its size. */
 static gbt_status make_jpeg(const image *full, picture_kind kind, size_t most, image *small,
                             unsigned char **bytes, size_t *count, gbt_error *err)
 {

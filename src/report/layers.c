@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/layers.c -- one view, from points to the picture: what the model is made of. */
+/* report/layers.c -- the section that shows one view in the stages of the method: points, balls, anchors,
+   Gaussians, render, photo. */
 #include <math.h>
 #include <string.h>
 
@@ -14,10 +15,10 @@
 
 enum { SIDE_MAX = 640, CHECK_SOLIDS = 1 << 14 };
 
-/* The stage that solids stand on: the same in light and dark. */
+/* Background of the solids, the same in the light and the dark theme. */
 static const float stage_color[3] = {0.086f, 0.094f, 0.11f};
 
-/** Arrays that are drawn and thrown away. */
+/** Temporary arrays for ellipsoids_draw(). */
 typedef struct solids {
     float *center, *axes, *quat, *color; /* one block, owned by `center` */
     size_t count;
@@ -51,7 +52,7 @@ static void set_sphere(solids *s, size_t i, const float center[3], float radius,
     }
 }
 
-/* ---- the four layers that are solids ---- */
+/* ---- the four stages drawn as solids ---- */
 
 static gbt_status make_points(const loaded_run *r, solids *s, gbt_error *err)
 {
@@ -62,7 +63,7 @@ static gbt_status make_points(const loaded_run *r, solids *s, gbt_error *err)
     return GBT_OK;
 }
 
-/** The balls of the sparse points, by the run's settings; none when its anchors did not come from balls. */
+/** The balls of the sparse points with the run's settings; none if its anchors did not come from balls. */
 static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
 {
     const scene_points *p = &r->scene.points;
@@ -85,8 +86,8 @@ static gbt_status make_balls(const loaded_run *r, solids *s, gbt_error *err)
     return status;
 }
 
-/** All anchors; those that the view decoded in the mean colour of their Gaussians, weighted by opacity, the
-    others grey. */
+/** All anchors. Those that were decoded for the view have the mean colour of their Gaussians, weighted by
+    opacity; the others are grey. */
 static gbt_status make_anchors(const loaded_run *r, solids *s, gbt_error *err)
 {
     const anchors *a = &r->model.anchors;
@@ -114,7 +115,7 @@ static gbt_status make_anchors(const loaded_run *r, solids *s, gbt_error *err)
     return GBT_OK;
 }
 
-/** What the tracer met, at one standard deviation; the faint ones are left out. */
+/** The Gaussians given to the tracer, drawn at one standard deviation; faint ones are left out. */
 static gbt_status make_gaussians(const loaded_run *r, solids *s, gbt_error *err)
 {
     static const float opacity_least = 0.1f;
@@ -188,8 +189,7 @@ static void add_solids(text *out, const loaded_run *r, const gbt_camera *camera,
     mem_free(s.center);
 }
 
-/** The scored view in the middle by PSNR: neither the best nor the worst of what there is; the first view
-    when none was held out. */
+/** The scored view with the median PSNR, as a typical one; the first view if none was held out. */
 static size_t choose_view(const loaded_run *r, const evaluation *e)
 {
     gbt_error ignored = {0};
@@ -207,8 +207,8 @@ static size_t choose_view(const loaded_run *r, const evaluation *e)
     return chosen;
 }
 
-/** The pinhole nearest to a lens, for solids: at least as fine as they need. False for a lens that has
-    none. */
+/** A pinhole with the lens's field of view, for drawing the solids, at least SIDE_MAX pixels long. False for
+    a lens that is too wide or too narrow for one. */
 static bool find_pinhole(const gbt_camera *lens, gbt_camera *out)
 {
     double tan_half[2];

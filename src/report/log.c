@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/log.c -- log.csv of a run as arrays. */
+/* report/log.c -- read log.csv of a run into arrays. */
 #include "report/log.h"
 
 #include <math.h>
@@ -36,7 +36,7 @@ static const char *const column_names[LOG_COLUMNS] = {
     "adjust_ms",
 };
 
-/** Cut a line at its commas, in place. More fields than FIELD_LIMIT are not looked at. */
+/** Split a line at its commas, in place. Fields beyond FIELD_LIMIT are ignored. */
 static size_t split_fields(char *line, char **fields)
 {
     size_t count = 0;
@@ -45,8 +45,8 @@ static size_t split_fields(char *line, char **fields)
     return count;
 }
 
-/** The line at *at, its end replaced by a zero; NULL when no whole line is left (the last one of a killed run
-    is torn). */
+/** The next whole line at *at, terminated in place; NULL if there is none. A killed run may leave a torn last
+    line. */
 static char *next_line(char **at)
 {
     char *line = *at, *end = strchr(line, '\n');
@@ -68,8 +68,8 @@ static double parse_field(const char *field)
 
 static void add_row(training_log *log, const double row[LOG_COLUMNS])
 {
-    while (log->count > 0 && log->column[LOG_STEP][log->count - 1] > row[LOG_STEP]) /* resumed from an earlier
-                                                                                       step */
+    while (log->count > 0 && log->column[LOG_STEP][log->count - 1] > row[LOG_STEP]) /* the run was resumed
+                                                                                       from an earlier step */
         log->count--;
     if (log->count > 0 && log->column[LOG_SECONDS][log->count - 1] > row[LOG_SECONDS])
         return;
@@ -97,8 +97,8 @@ static void read_rows(char *at, training_log *log)
         double row[LOG_COLUMNS];
         for (int i = 0; i < LOG_COLUMNS; i++)
             row[i] = place[i] < field_count ? parse_field(fields[place[i]]) : (double)NAN;
-        /* A held-out score right after a row has no steps of its own: its means are zeros, not
-           measurements. */
+        /* A held-out score logged right after a row covers no steps: its means are zeros, not measurements.
+         */
         if (row[LOG_RAYS_PER_SECOND] <= 0)
             for (int i = LOG_LOSS; i < LOG_COLUMNS; i++)
                 if (i != LOG_ANCHORS && i != LOG_MEMORY)

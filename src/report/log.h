@@ -17,7 +17,7 @@ typedef enum log_column {
     LOG_RAYS_PER_SECOND,
     LOG_BLENDED,
     LOG_MEMORY,
-    LOG_PHOTO_MS, /* from here on: stages of a step, in the order in which they happen */
+    LOG_PHOTO_MS, /* from here on: stages of a step, in order of execution */
     LOG_RAYS_MS,
     LOG_VISIBLE_MS,
     LOG_DECODE_MS,
@@ -33,21 +33,23 @@ typedef enum log_column {
 
 typedef struct training_log {
     size_t count;
-    double *column[LOG_COLUMNS]; /* [count]; NaN: absent. Owned as one block, column[0]. Steps and seconds
-                                    never fall. */
+    double *column[LOG_COLUMNS]; /* [count]; NaN: missing. One block, owned by column[0]. Steps and seconds
+                                    never decrease. */
 } training_log;
 
 /**
- * Columns are found by their names in the first line. A line without its end, with too few fields or without
- * a time is left out. Where a resumed run went back, what it repeated replaces the first try.
+ * Read log.csv. Columns are found by their names in the first line. Lines that are torn, have too few fields
+ * or have no time are skipped. If the run was resumed from an earlier step, rows of the repeated steps
+ * replace the first ones.
  *
- * @param out [out] free with training_log_free(); no rows when there is no such file
+ * @param out [out] free with training_log_free(); no rows if the file does not exist
  * @return GBT_OK, GBT_ERR_NO_MEMORY
  */
 gbt_status training_log_read(const char *path, training_log *out, gbt_error *err);
 void training_log_free(training_log *log);
 
-/** The mean of what is finite within `reach_seconds` on both sides; NaN where there is nothing. */
+/** Moving average: the mean of the finite values within `reach_seconds` on both sides; NaN if there are none.
+ */
 void training_log_smooth(const training_log *log, log_column column, double reach_seconds, double *out);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/maps.c -- cameras from above and from the side, over points and anchors. */
+/* report/maps.c -- maps of the scene: cameras from above and from the side, over points and anchors. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,7 @@
 #include "report/image.h"
 #include "report/scene.h"
 
-/* Sizes in the chart's units; the picture behind it has DENSE pixels in each. */
+/* Sizes in the chart's units; the picture behind it has DENSE pixels per unit. */
 enum {
     MAP_WIDTH = 460,
     MAP_HEIGHT_MAX = 420,
@@ -25,15 +25,15 @@ enum {
     DUST_MAX = 20000
 };
 
-/** One way to look at the scene along parallel rays. */
+/** One orthographic view of the scene. */
 typedef struct map {
     const char *title, *name;
     double right[3], down[3], middle[3];
-    double scale; /* units of the chart per unit of the scene */
+    double scale; /* units of the chart per scene unit */
     int height;
 } map;
 
-/** Range along an axis of all cameras and of the middle 94 % of the points. */
+/** The range, along an axis, of all cameras and the central 94 % of the points. */
 static gbt_status find_range(const loaded_run *r, const double axis[3], double range[2], gbt_error *err)
 {
     const scene_points *p = &r->scene.points;
@@ -62,7 +62,7 @@ static gbt_status find_range(const loaded_run *r, const double axis[3], double r
     return GBT_OK;
 }
 
-/** The horizontal direction in which the cameras are spread most. */
+/** The horizontal direction in which the cameras' positions vary most. */
 static void find_right(const loaded_run *r, const double up[3], double right[3])
 {
     double e1[3], e2[3], mean[2] = {0}, xx = 0, xy = 0, yy = 0;
@@ -130,9 +130,9 @@ static gbt_status make_maps(const loaded_run *r, map maps[2], gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- dust ---- */
+/* ---- points and anchors as dust ---- */
 
-/** Up to DUST_MAX of them, evenly chosen; color NULL: grey. */
+/** Draw up to DUST_MAX positions, evenly sampled; color NULL: grey. */
 static gbt_status draw_dust(const float *position, const float *color, size_t count, float pixels,
                             const gbt_camera *camera, image *picture, gbt_error *err)
 {
@@ -199,7 +199,7 @@ static void place(const map *m, const double at[3], double out[2])
     out[1] = 0.5 * m->height + m->scale * dvec_dot(way, m->down);
 }
 
-/** A pyramid from the centre along the view, as wide as the lens sees. */
+/** A camera as a pyramid from its centre along the view, with the lens's field of view. */
 static void add_camera(text *out, const map *m, const gbt_camera *c, bool is_held)
 {
     static const double sides[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
@@ -243,24 +243,25 @@ static void add_view(text *out, const map *m, const scene_view *view, const eval
     text_add(out, is_scored ? "</a>" : "");
 }
 
-/** One in so many of the training cameras is shown. */
+/** Every how many training cameras one is shown. */
 static size_t step_of_cameras(const loaded_run *r)
 {
     return (r->scene.view_count + CAMERAS_MAX - 1) / CAMERAS_MAX;
 }
 
-/** Held-out ones last, above the others. */
+/** Training cameras first, then the held-out ones on top of them. */
 static void add_cameras(text *out, const map *m, const loaded_run *r, const evaluation *e)
 {
     const size_t step = step_of_cameras(r);
-    size_t trained = 0; /* counted by themselves: every eighth view is held out */
+    size_t trained = 0; /* counts training views alone: every eighth view is held out, and a step over all
+                           views could hit only those */
     for (int held = 0; held < 2; held++)
         for (size_t i = 0; i < r->scene.view_count; i++)
             if (r->scene.views[i].is_test == (held > 0) && (held > 0 || trained++ % step == 0))
                 add_view(out, m, &r->scene.views[i], e);
 }
 
-/** A round length near a fifth of the width. */
+/** A scale bar: a round length near a fifth of the map's width. */
 static void add_ruler(text *out, const map *m)
 {
     double ticks[CHART_MAX_TICKS];

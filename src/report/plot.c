@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/plot.c -- axes of charts: round numbers, labels, where a value is; and the frame of an SVG file. */
+/* report/plot.c -- axes of charts: round ticks, labels, data to chart coordinates; and the frame of an SVG
+   file. */
 #include "report/plot.h"
 
 #include <math.h>
 
 /* ---- ticks ---- */
 
-/** The smallest 1, 2 or 5 times a power of ten that is not below x > 0. */
+/** The smallest number 1, 2 or 5 times a power of ten that is >= x > 0. */
 static double round_up(double x)
 {
     const double power = pow(10, floor(log10(x))), digit = x / power;
@@ -16,8 +17,7 @@ static double round_up(double x)
 int chart_ticks(double low, double high, int wanted, double *ticks)
 {
     double span = high - low;
-    if (!(span > 1e-9 * fmax(fabs(low), fabs(high)))) /* equal, or too near for their digits: a step around
-                                                         them */
+    if (!(span > 1e-9 * fmax(fabs(low), fabs(high)))) /* equal up to rounding: make a step around them */
         span = fmax(fabs(low), fabs(high)) * 1e-3 + 1e-9;
     for (double step = round_up(span / (wanted > 1 ? wanted : 1));; step = round_up(step * 1.5)) {
         double first = floor(low / step + 1e-6), last = ceil(high / step - 1e-6);
@@ -35,7 +35,7 @@ int chart_ticks(double low, double high, int wanted, double *ticks)
 int chart_log_ticks(double low, double high, double *ticks)
 {
     static const int digits[] = {1, 2, 5};
-    int first = 3 * (int)floor(log10(low)), last; /* tick k is digits[k mod 3] * 10^(k / 3) */
+    int first = 3 * (int)floor(log10(low)), last; /* tick k is digits[k mod 3] * 10^floor(k / 3) */
     int stride = 1;
 #define LOG_TICK(k) (digits[(((k) % 3) + 3) % 3] * pow(10, floor((k) / 3.0)))
     while (LOG_TICK(first + 1) <= low * 1.0000001)
@@ -43,7 +43,7 @@ int chart_log_ticks(double low, double high, double *ticks)
     last = first + 1;
     while (LOG_TICK(last) < high * 0.9999999)
         last++;
-    if (last - first + 1 > 8) { /* whole decades, and then every n-th of them */
+    if (last - first + 1 > 8) { /* too many: powers of ten only, of these every n-th */
         first -= ((first % 3) + 3) % 3;
         last += (3 - ((last % 3) + 3) % 3) % 3;
         stride = 3;
@@ -58,7 +58,8 @@ int chart_log_ticks(double low, double high, double *ticks)
     return count;
 }
 
-/** 20k, 1.5M: short enough for an axis, with the digits that tell neighbours `step` apart. */
+/** A tick label, short enough for an axis (20k, 1.5M), with enough digits to distinguish neighbours that are
+    `step` apart. */
 static void add_tick_label(text *out, double value, double step)
 {
     static const struct {
@@ -81,8 +82,7 @@ static void add_tick_label(text *out, double value, double step)
 
 /* ---- values ---- */
 
-/* Beyond this, differences and powers of ten leave the range of a double; nothing that a run measures comes
-   near. */
+/* Beyond this limit, differences and powers of ten may overflow a double; no measurement comes near it. */
 static const double value_limit = 1e100;
 
 static bool axis_can_show(const plot_axis *a, double value)
@@ -153,7 +153,7 @@ static void add_axis_tick(text *out, const plot_axis *a, int i)
     text_add(out, "</text>");
 }
 
-/* Ticks beyond the values, where the axis ends with these. */
+/* Whether a tick lies outside the axis, which can be where the axis ends with the values. */
 static bool is_outside(const plot_axis *a, double tick)
 {
     return tick < a->low - 1e-9 * fabs(a->low) || tick > a->high * (1 + 1e-9);

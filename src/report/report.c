@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/report.c -- the page of a run, from top to bottom.
+/* report/report.c -- write the page of a run, section by section.
 
-   evaluation (scores, PNG files) --+
-   metrics (the object)           --+
-   RUN/log.csv                    --+--> one HTML text --> RUN/report.html
-   the run, open: model, cameras  --+
-   charts of studies (SVG files)  --+ */
+     evaluation (scores, PNG files) --+
+     metrics (the object)           --+
+     RUN/log.csv                    --+--> one HTML text --> RUN/report.html
+     the open run: model, cameras   --+
+     charts of studies (SVG files)  --+ */
 #include "report/report.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@
 #include "report/training.h"
 #include "report/views.h"
 
-/** The last part of a path, slashes at the end left out: a data set's name. */
+/** The last component of a path, without trailing slashes: the name of a data set. */
 static void base_name(const char *path, char *out, size_t size)
 {
     size_t end = strlen(path);

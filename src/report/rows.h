@@ -5,7 +5,7 @@
 
 #include "report/text.h"
 
-/* Names are markup of this program; what is not known is "n/a". */
+/* Names are trusted markup of this program; unknown values appear as "n/a". */
 void report_open_row(text *out, const char *name);
 void report_close_row(text *out);
 void report_text_row(text *out, const char *name, const char *value);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/studies.c -- charts that studies left, as a section of the page. */
+/* report/studies.c -- embed the charts of studies as a section of the page. */
 #include "report/studies.h"
 
 #include <dirent.h>
@@ -12,7 +12,7 @@
 
 enum { CHART_BYTES_MAX = 1000000, CHARTS_MAX = 16, PATH_LIMIT = 4096 };
 
-/* The studies of this program, by the names of their files. */
+/* Headings of this program's studies, by the names of their files. */
 static const struct {
     const char *name, *title;
 } known[] = {{"speed", "Speed against accuracy"}, {"crosscheck", "Tracer against rasterizer"},
@@ -70,7 +70,7 @@ static void add_chart(text *out, const char *path, int *count)
 
 static int only_charts(const struct dirent *entry) { return report_is_chart(entry->d_name); }
 
-/** Charts of a folder by name, so that the page does not depend on the order in which the disk lists them. */
+/** Add the charts of a folder, sorted by name: the order of a directory listing is not defined. */
 static void add_folder(text *out, const char *folder, int *count)
 {
     struct dirent **entries = NULL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/studies.h -- charts that studies left, as a section of the page. */
+/* report/studies.h -- embed the charts of studies as a section of the page. */
 #ifndef GBT_REPORT_STUDIES_H
 #define GBT_REPORT_STUDIES_H
 
@@ -7,15 +7,15 @@
 
 #include "report/text.h"
 
-/** Whether a file of this name is a chart: .svg, and not hidden. */
+/** Whether a file of this name is a chart: it ends in .svg and is not hidden. */
 bool report_is_chart(const char *name);
 
 /**
- * Add every SVG file of RUN, of RUN/studies and of the given folders, or those given by name; nothing when
- * there is none.
+ * Add all SVG files of RUN, of RUN/studies and of the given folders, and SVG files given by name. Without
+ * any, nothing is added.
  *
- * They go in as pictures: whatever they hold, nothing in them runs or is loaded. Files that cannot be read,
- * or are larger than a megabyte, are left out with a warning, as are all beyond 16.
+ * They are embedded as images, so that nothing in them can run or load anything. Files that cannot be read or
+ * are larger than a megabyte are skipped with a warning, as are all beyond 16.
  */
 void report_studies(text *out, const char *run, const char *const *studies, size_t count);
 

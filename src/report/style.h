@@ -5,6 +5,6 @@
 #define GBT_REPORT_STYLE_H
 
 extern const char report_css[];
-extern const char report_script[]; /* moves the sliders and sorts; the page is whole without it */
+extern const char report_script[]; /* moves the sliders and sorts tables; the page works without it */
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/text.c -- a growing text for pages: escaping, base64, numbers as people read them. */
+/* report/text.c -- a growing string for pages: escaping, base64, numbers formatted for people. */
 #include "report/text.h"
 
 #include <math.h>
@@ -72,15 +72,15 @@ void text_format(text *t, const char *format, ...)
     va_copy(again, args);
     const int count = vsnprintf(NULL, 0, format, args);
     va_end(args);
-    if (count >= 0 && make_room(t, (size_t)count + 1)) { /* vsnprintf writes a zero too */
+    if (count >= 0 && make_room(t, (size_t)count + 1)) { /* vsnprintf() also writes a terminating zero */
         vsnprintf(t->bytes + t->length, (size_t)count + 1, format, again);
         t->length += (size_t)count;
     }
     va_end(again);
 }
 
-/** Bytes of the well-formed UTF-8 character at `s` (RFC 3629: shortest form, no surrogates, at most
-    U+10FFFF); 0: not one. */
+/** Length in bytes of the well-formed UTF-8 character at `s` (RFC 3629: shortest form, no surrogates, at most
+    U+10FFFF); 0 if there is none. */
 static size_t utf8_length(const unsigned char *s)
 {
     if (s[0] < 0x80)
@@ -98,7 +98,7 @@ static size_t utf8_length(const unsigned char *s)
     if (length == 0 || s[1] < lowest || s[1] > highest)
         return 0;
     for (size_t i = 2; i < length; i++)
-        if ((s[i] & 0xc0) != 0x80) /* a terminating zero stops here too */
+        if ((s[i] & 0xc0) != 0x80) /* also stops at a terminating zero */
             return 0;
     return length;
 }

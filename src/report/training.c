@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/training.c -- how training went: curves over time, and where its time went. */
+/* report/training.c -- the sections about training: curves over time, and the time of each stage. */
 #include "report/training.h"
 
 #include <math.h>
@@ -33,7 +33,7 @@ typedef struct curves {
     training_log log;
     time_unit unit;
     double *block, *time, *loss, *psnr, *rays, *gaussians, *blended,
-        *megabytes; /* block owns the others, [log.count] each */
+        *megabytes; /* one block owns all arrays, [log.count] each */
     double held_out_time[HELD_OUT_LIMIT], held_out_psnr[HELD_OUT_LIMIT];
     size_t held_out_count;
 } curves;
@@ -70,7 +70,7 @@ static gbt_status curves_make(curves *c, const char *run, const evaluation *e, c
     c->gaussians = c->rays + n, c->blended = c->gaussians + n, c->megabytes = c->blended + n;
     if (n == 0)
         return GBT_OK;
-    const double reach = 0.015 * longest; /* on each side: a few seconds of a short run */
+    const double reach = 0.015 * longest; /* on each side; a few seconds for a short run */
     training_log_smooth(&c->log, LOG_LOSS, reach, c->loss);
     training_log_smooth(&c->log, LOG_TRAIN_PSNR, reach, c->psnr);
     training_log_smooth(&c->log, LOG_RAYS_PER_SECOND, reach, c->rays);
@@ -161,7 +161,7 @@ static void add_curves(text *out, const curves *c)
 
 static void add_stage_layers(text *out, const curves *c)
 {
-    /* Stages of one kind are one layer: more than these cannot be told apart. */
+    /* Similar stages share one layer: more layers could not be told apart. */
     static const struct {
         const char *name;
         log_column first, last;
@@ -193,7 +193,7 @@ static void add_stage_layers(text *out, const curves *c)
     mem_free(sum);
 }
 
-/* Stages of a step as train.json names them, in the order in which they happen; those of one colour are one
+/* Stages of a step, named as in train.json and in order of execution. Those with the same colour form one
    layer. */
 static const struct {
     const char *key, *name;

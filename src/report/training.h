@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* report/training.h -- how training went: curves over time, and where its time went. */
+/* report/training.h -- the sections about training: curves over time, and the time of each stage. */
 #ifndef GBT_REPORT_TRAINING_H
 #define GBT_REPORT_TRAINING_H
 
@@ -8,7 +8,7 @@
 #include "eval/scores.h"
 #include "report/text.h"
 
-/** Add the sections "Training" and "Where the time goes" from RUN/log.csv and what metrics.json holds. */
+/** Add the sections "Training" and "Where the time goes", from RUN/log.csv and metrics.json. */
 void report_training(text *out, const char *run, const evaluation *e, const json_t *metrics);
 
 #endif

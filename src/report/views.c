@@ -10,8 +10,8 @@
 #include "base/memory.h"
 #include "report/image.h"
 
-/* What keeps a page to a few megabytes: three pictures a view take about 0.4 bytes for each of its pixels.
-   The whole ones are beside it. */
+/* Limits that keep a page to a few megabytes: the three pictures of a view take about 0.4 bytes per pixel.
+   The full pictures are separate files, which the page links to. */
 enum { PICTURES_MAX_PIXELS = 5600000, PICTURE_MAX_PIXELS = 1000000 };
 
 typedef struct ranked {
@@ -39,7 +39,7 @@ size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
         order[i] = i;
         scored += !isnan(e->views[i].psnr);
     }
-    if (rank != NULL) { /* without memory the order is that of the data set */
+    if (rank != NULL) { /* out of memory: keep the order of the data set */
         for (size_t i = 0; i < n; i++)
             rank[i] = (ranked){e->views[i].psnr, i};
         qsort(rank, n, sizeof *rank, compare_psnr);
@@ -51,7 +51,8 @@ size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
         memcpy(shown, order, n * sizeof *order);
         return n;
     }
-    const size_t end = scored > REPORT_MAX_VIEWS ? scored : REPORT_MAX_VIEWS; /* those behind have no score */
+    const size_t end = scored > REPORT_MAX_VIEWS ? scored : REPORT_MAX_VIEWS; /* views behind the scored ones
+                                                                                 have no score */
     for (size_t i = 0; i < third; i++) {
         shown[i] = order[i];
         shown[third + i] = order[end / 2 - third / 2 + i];
@@ -60,7 +61,7 @@ size_t report_choose_views(const evaluation *e, size_t *shown, size_t *order)
     return REPORT_MAX_VIEWS;
 }
 
-/** An <img>, or a line that says that there is none. */
+/** An <img>, or a line that says that there is no picture. */
 static void add_picture(text *out, const char *class_name, const char *what, const view_score *v,
                         const char *path, picture_kind kind, size_t most)
 {
@@ -75,7 +76,7 @@ static void add_picture(text *out, const char *class_name, const char *what, con
         text_format(out, "\" width=\"%d\" height=\"%d\">", width, height);
         if (width > 0 || out->status != GBT_OK)
             return;
-        out->length = before; /* its head could be read, its pixels could not */
+        out->length = before; /* the file's header could be read, its pixels could not */
     }
     text_format(out, "<span class=\"missing\">%s: n/a</span>", what);
 }
@@ -136,7 +137,7 @@ static void add_color_scale(text *out)
     text_add(out, ")\"></i> 1 (different at first sight)</span>");
 }
 
-/** A link to a file of the run, from the page that lies in its folder; nothing when it is elsewhere. */
+/** A link to a file inside the run's folder, relative to the page; nothing for a file elsewhere. */
 static void add_link(text *out, const char *run, const char *path, const char *name)
 {
     const size_t length = strlen(run);
@@ -161,7 +162,8 @@ static void add_cell(text *out, double value, int decimals)
         text_number(out, value, decimals);
 }
 
-/* The row of a view leads to its pictures above; where they are not shown, who looks for them comes here. */
+/* A row of the table. It links to the view's pictures above; if these are not shown, the row itself is the
+   target of links to the view. */
 static void add_row(text *out, const char *run, const evaluation *e, size_t index, bool is_shown,
                     size_t place, double low, double high)
 {
@@ -204,7 +206,7 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
             low = fmin(low, e->views[i].psnr);
             high = fmax(high, e->views[i].psnr);
         }
-    low = floor(low - 1); /* so that the worst has a bar too */
+    low = floor(low - 1); /* so that the worst view has a visible bar too */
     text_format(
         out,
         "<details class=\"card\" open><summary>All %zu views as a table</summary><div "
@@ -222,7 +224,7 @@ static void add_table(text *out, const char *run, const evaluation *e, const siz
     text_add(out, "</tbody></table></div></details>\n");
 }
 
-/** Whether most of what is shown is higher than wide: then two of them go side by side. */
+/** Whether most of the shown views are in portrait format: then two of them fit side by side. */
 static bool are_tall(const evaluation *e, const size_t *shown, size_t count)
 {
     size_t tall = 0;

@@ -7,16 +7,16 @@
 #include "eval/scores.h"
 #include "report/text.h"
 
-enum { REPORT_MAX_VIEWS = 24 }; /* of more, a third each: worst, middle, best */
+enum { REPORT_MAX_VIEWS = 24 }; /* of more views, a third each: worst, median, best */
 
 /**
- * Add the section, worst PSNR first. Pictures below the folder `run` get links. `protocol`: how scores are
- * made, one sentence; NULL: nothing is said. `scored`: of which pixels; optional (NULL).
+ * Add the section, worst PSNR first. Pictures inside the folder `run` get links. `protocol`: one sentence on
+ * how scores are made, or NULL. `scored`: one sentence on which pixels count, or NULL.
  */
 void report_views(text *out, const char *run, const evaluation *e, const char *protocol, const char *scored);
 
 /**
- * Which views to show, worst first; those without a score last, and only where there is room for them.
+ * Choose the views to show, worst first. Views without a score come last, and only if there is room for them.
  *
  * @param shown [out] indices, [REPORT_MAX_VIEWS]
  * @param order [out] all indices, worst first, [view_count]

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/answer.c -- texts and failures as answers. */
+/* view/answer.c -- HTTP answers made of a text or of a failure. */
 #include "view/answer.h"
 
 #include <stdio.h>

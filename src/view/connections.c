@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/connections.c -- a deadline for each connection. libmicrohttpd has none for those that send a byte now
-   and then: its timeout begins anew at each. */
+/* view/connections.c -- a deadline for each connection. libmicrohttpd has only a timeout that starts anew
+   with every byte, so a client that sends a byte now and then would hold its connection forever. */
 #include "view/connections.h"
 
 #include <math.h>

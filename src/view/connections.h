@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/connections.h -- the sockets of the server's clients: who has been slow for too long, and who has
- * left. */
+/* view/connections.h -- the sockets of the server's clients: which of them are too slow, and which have
+   disconnected. */
 #ifndef GBT_VIEW_CONNECTIONS_H
 #define GBT_VIEW_CONNECTIONS_H
 
@@ -8,29 +8,30 @@
 #include <stdbool.h>
 
 typedef struct connection_entry {
-    struct MHD_Connection *connection; /* NULL: free */
+    struct MHD_Connection *connection; /* NULL: unused entry */
     int socket;
-    double until; /* clock_wall() when its patience ends; infinite while we work for it */
+    double until; /* deadline by clock_wall(); infinite while the server works on its request */
 } connection_entry;
 
-/** Of a server; used with its lock held. */
+/** All connections of a server; used with the server's lock held. */
 typedef struct connections {
     connection_entry *entries;
     int capacity;
-    double request_seconds, answer_seconds; /* for a whole request, and to take a whole answer */
+    double request_seconds,
+        answer_seconds; /* time limits for sending a whole request, and for receiving a whole answer */
 } connections;
 
-/** A connection begins, or waits for its next request. */
+/** A connection was opened, or waits for its next request: the client must send one in time. */
 void connections_expect_request(connections *c, struct MHD_Connection *connection);
-/** Its request is whole: the time is ours. */
+/** Its request is complete: no deadline while the server works on it. */
 void connections_hold(connections *c, struct MHD_Connection *connection);
 void connections_expect_taking(connections *c, struct MHD_Connection *connection);
 void connections_forget(connections *c, struct MHD_Connection *connection);
 
-/** Shut the sockets of those whose time is over: libmicrohttpd then closes them. */
+/** Shut down the sockets whose deadline has passed; libmicrohttpd then closes the connections. */
 void connections_shut_slow(connections *c);
 
-/** Whether the other side has closed. */
+/** Whether the client has closed its side. */
 bool connections_has_left(const connections *c, const struct MHD_Connection *connection);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/guard.c -- address, Host and token. */
+/* view/guard.c -- access control: listening address, Host header and token. */
 #include "view/guard.h"
 
 #include <arpa/inet.h>
@@ -63,12 +63,13 @@ bool guard_knows_token(const guard *g, const char *given)
     return differs == 0;
 }
 
-/* The address that packets to other networks would leave from; none is sent. False without such a network. */
+/* The address from which this machine reaches other networks, found by connecting a UDP socket, which sends
+   no packet. False if there is no such network. */
 static bool find_own_address(char out[INET_ADDRSTRLEN])
 {
     struct sockaddr_in there = {.sin_family = AF_INET, .sin_port = htons(9)}, here;
     socklen_t size = sizeof here;
-    inet_pton(AF_INET, "192.0.2.1", &there.sin_addr); /* for documentation: nobody's */
+    inet_pton(AF_INET, "192.0.2.1", &there.sin_addr); /* reserved for documentation, so it is nobody's */
     const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     const bool found = fd >= 0 && connect(fd, (struct sockaddr *)&there, sizeof there) == 0 &&
                        getsockname(fd, (struct sockaddr *)&here, &size) == 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/http.c -- who may ask, and the headers of what is sent. */
+/* view/http.c -- the checks of every request, and the headers of every response. */
 #include "view/http.h"
 
 #include <stdio.h>
@@ -11,7 +11,7 @@
 
 enum { COOKIE_NAME_SIZE = 24 };
 
-/* A browser sends a host's cookies to each of its ports: the name tells this server's from another's. */
+/* The port is part of the name because a browser sends a host's cookies to all ports of that host. */
 static void cookie_name(struct MHD_Connection *connection, char out[COOKIE_NAME_SIZE])
 {
     struct MHD_Daemon *daemon = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_DAEMON)->daemon;
@@ -32,9 +32,10 @@ static bool has_token(struct MHD_Connection *connection, const guard *g)
            guard_knows_token(g, MHD_lookup_connection_value(connection, MHD_COOKIE_KIND, name));
 }
 
-/* As far as the browser tells: none says Sec-Fetch-Site to a plain http address that is not its own
-   machine's, and Origin goes with few requests. There the cookie does it, which no other site's page makes a
-   browser send. */
+/* Whether the browser says that another site's page makes this request. Browsers send Sec-Fetch-Site only to
+   trustworthy addresses, which a plain http address is only on the same machine, and Origin only with some
+   requests. Where both are missing the cookie protects: pages of other sites cannot make the browser send it.
+   */
 static bool is_another_sites(struct MHD_Connection *connection, const char *path, const char *host)
 {
     const char *site = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Sec-Fetch-Site");

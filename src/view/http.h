@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/http.h -- what every request is held to, and what every response carries. */
+/* view/http.h -- the checks of every request, and the headers of every response. */
 #ifndef GBT_VIEW_HTTP_H
 #define GBT_VIEW_HTTP_H
 
@@ -9,19 +9,20 @@
 #include "view/answer.h"
 #include "view/guard.h"
 
-/** Why a request is refused before anybody looks at what it wants; 0: it is not. `why` is static. */
+/** The HTTP status code with which a request is refused before it is interpreted; 0: it is accepted. `why` is
+    static. */
 int http_refusal(struct MHD_Connection *connection, const guard *g, const char *path, const char *method,
                  const char **why);
 
 /**
- * Send; the bytes are freed when they have been sent, or `with->bytes` are static and stay when `keeps`.
+ * Send an answer. Its bytes are freed once they are sent, unless `keeps`: then they are static.
  *
- * A request that showed the token in its query gets it back as a cookie: the page's own requests need no
- * more.
+ * If the request had the token in its query, the response sets it as a cookie, so that the page's own
+ * requests need not carry it.
  */
 enum MHD_Result http_send(struct MHD_Connection *connection, const guard *g, const answer *with, bool keeps);
 
-/** The page or one of its files; false when there is none of that name. */
+/** The page or one of its files; false if there is no file of that name. */
 bool http_page(const char *path, answer *out);
 
 #endif

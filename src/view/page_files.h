@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/page_files.h -- the files of src/view/page/ as bytes; page_files.c is made of them at build time
-   (page_files.cmake). */
+/* view/page_files.h -- the files of src/view/page/, embedded as bytes. page_files.cmake generates
+   page_files.c at build time. */
 #ifndef GBT_VIEW_PAGE_FILES_H
 #define GBT_VIEW_PAGE_FILES_H
 
@@ -12,7 +12,7 @@ typedef struct page_file {
     size_t count;
 } page_file;
 
-/** The file of that name; NULL for another. */
+/** The file of that name; NULL if there is none. */
 const page_file *page_file_find(const char *name);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/pick.c -- the point of the scene behind a pixel. */
+/* view/pick.c -- find the point of the scene behind a pixel. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,8 +8,8 @@
 #include "render/render_outputs.h"
 #include "view/studio.h"
 
-/* One pixel, as wide as those of `camera`, that looks along its ray through `pixel`. False where the lens has
-   no ray. */
+/* A camera of one pixel that looks along the ray of `camera` through `pixel`, with the same pixel size. False
+   if the lens has no ray there. */
 static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out)
 {
     double origin[3], dir[3], target[3], half_fov_tan[2];
@@ -24,7 +24,7 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
             least = k;
     }
     double up[3] = {0, 0, 0};
-    up[least] = 1; /* never along the view */
+    up[least] = 1; /* not parallel to the view */
     memset(out, 0, sizeof *out);
     out->model = GBT_CAMERA_PINHOLE;
     out->width = out->height = 1;
@@ -33,7 +33,8 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
     return gbt_camera_look_at(origin, target, up, out);
 }
 
-/* Where the ray of a camera of one pixel passes the half of what it sees; 0: nowhere. */
+/* The median depth along the ray of a one-pixel camera, where its transmittance falls below one half; 0 if it
+   does not. */
 static gbt_status find_depth(studio *s, const gbt_camera *one, int view, double *depth, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(one);

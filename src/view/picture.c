@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/picture.c -- a request for a picture: render or trace again, and the bytes of it. */
+/* view/picture.c -- answer a request for a picture: render it, or trace the current Gaussians again, and
+   encode it. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,12 +12,12 @@
 #include "render/render_outputs.h"
 #include "view/studio.h"
 
-/* Milliseconds. */
+/* In milliseconds. */
 typedef struct picture_times {
     double prepare, trace, encode;
 } picture_times;
 
-/* ---- bytes ---- */
+/* ---- encoding ---- */
 
 typedef struct rgba_work {
     const image *from;
@@ -94,9 +95,9 @@ static gbt_status finish(const studio *s, const image *im, const request *what, 
     return GBT_OK;
 }
 
-/* ---- pixels ---- */
+/* ---- rendering ---- */
 
-/* Point `n` of Halton's sequence (Halton 1960) in a base, in (0, 1). */
+/* Element `n` of the Halton sequence (Halton 1960) in a base, in (0, 1). */
 static double halton(int n, int base)
 {
     double value = 0, digit = 1;
@@ -107,7 +108,8 @@ static double halton(int n, int base)
     return value;
 }
 
-/* The camera of sample `n`: its rays meet other points of the pixels. Sample 0 is the camera itself. */
+/* The camera of sample `n`, for antialiasing: its rays go through other points of the pixels. Sample 0 is the
+   camera itself. */
 static gbt_camera sample_camera(const gbt_camera *camera, int n)
 {
     gbt_camera shifted = *camera;
@@ -136,8 +138,8 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));
     const double prepared = clock_wall(), before = 1000 * (prepared - begin);
     if (whole) {
-        picture_times times = {.trace = fmin(1000 * f->times.trace.wall, before)}; /* nothing, when it was
-                                                                                 drawn already */
+        picture_times times = {.trace = fmin(1000 * f->times.trace.wall, before)}; /* 0 if it had been drawn
+                                                                                      before */
         times.prepare = before - times.trace;
         return finish(s, &f->rgb, what, &times, out, err);
     }
@@ -152,7 +154,7 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
     return status;
 }
 
-/* Which pixels of a photo count, as in scores; `f` holds them. */
+/* Which pixels of a photo count when it is scored. The result is kept in `f`. */
 static gbt_status find_marks(const studio *s, size_t view, const unsigned char *valid, frame *f,
                              const unsigned char **marks, gbt_error *err)
 {
@@ -167,9 +169,9 @@ gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *
     gbt_camera camera;
     picture_times times = {0};
     image photo = {0};
-    frame lens = {0}; /* its rays alone */
+    frame lens = {0}; /* only its rays are used */
     const unsigned char *valid, *marks = NULL;
-    GBT_TRY(studio_camera(s, what, &camera, err)); /* there is such a view */
+    GBT_TRY(studio_camera(s, what, &camera, err)); /* fails if there is no such view */
     gbt_status status = photos_get(&s->run->photos, (size_t)what->view, 0, &photo, &valid, err);
     if (status == GBT_OK && what->format == REQUEST_RAW)
         status = find_marks(s, (size_t)what->view, valid, &lens, &marks, err);

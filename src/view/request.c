@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/request.c -- a query's words, each checked. */
+/* view/request.c -- parse and check a query. */
 #include "view/request.h"
 
 #include <string.h>
@@ -86,7 +86,7 @@ static gbt_status take_camera(const words *w, request *out)
     return request_check_size(shot.camera.width, shot.camera.height, w->err);
 }
 
-/* Six hexadecimal digits. */
+/* The background colour as six hexadecimal digits. */
 static gbt_status take_background(const words *w, request *out)
 {
     static const char digits[] = "0123456789abcdef";

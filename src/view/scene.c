@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/scene.c -- what there is to see, as JSON: counts, the scene's extent, the views and their cameras. */
+/* view/scene.c -- describe the scene as JSON: counts, extent, views and their cameras. */
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,9 +13,9 @@
 #include "data/json_out.h"
 #include "view/studio.h"
 
-enum { SORTED_MAX = 100000 }; /* of more positions, evenly chosen ones say the extent */
+enum { SORTED_MAX = 100000 }; /* positions used to find the extent; of more, an even sample */
 
-/* origin, target and up as a camera file has them. */
+/* origin, target and up, as in a camera file. */
 static json_t *describe_pose(const gbt_camera *camera, const double origin[3])
 {
     const double *down = camera->rotation + 3, *forward = camera->rotation + 6;
@@ -42,9 +42,8 @@ static json_t *describe_view(const loaded_run *r, size_t i)
 
 typedef struct extent {
     double center[3],
-        size; /* of the middle half of what there is, in each direction; the largest of its three sides */
-    double up[3], floor; /* up of the photos on the whole; how high what there is begins along it: all but 5 %
-                            is above */
+        size;            /* of the box with the middle half of all positions, by axis; size: longest side */
+    double up[3], floor; /* up: mean up axis of the photos' cameras; floor: height above which 95 % lie */
 } extent;
 
 static void find_up(const loaded_run *r, double up[3])
@@ -58,7 +57,7 @@ static void find_up(const loaded_run *r, double up[3])
         up[k] = length > 1e-3 ? sum[k] / length : k == 1 ? -1 : 0;
 }
 
-/* Coordinates of `count` positions, `step` apart in memory, along an axis, ascending. */
+/* Coordinates along an axis of `count` positions with a stride of `step`, ascending. */
 static void sort_along(const float *position, size_t count, size_t step, const double axis[3], float *sorted)
 {
     for (size_t i = 0; i < count; i++) {
@@ -76,7 +75,8 @@ static gbt_status find_extent(const loaded_run *r, extent *out, gbt_error *err)
     const size_t step = all > SORTED_MAX ? (all + SORTED_MAX - 1) / SORTED_MAX : 1,
                  count = (all + step - 1) / step;
     const float *position = plain ? r->cloud.mean : r->model.anchors.position;
-    float *sorted = mem_calloc(count + 1, sizeof *sorted, "positions", err); /* one more: there may be none */
+    float *sorted =
+        mem_calloc(count + 1, sizeof *sorted, "positions", err); /* one more, as there may be none */
     if (sorted == NULL)
         return GBT_ERR_NO_MEMORY;
     const size_t last = count > 0 ? count - 1 : 0;

@@ -1,5 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/server.c -- libmicrohttpd in one thread of its own, and the queue between it and the worker. */
+/* view/server.c -- the HTTP server: libmicrohttpd in its own thread, and the queue of jobs for the worker.
+
+     libmicrohttpd's thread: on_request() --> http_page(), /status, /log: answered at once
+                                          --> put_in(): a job; its connection is suspended
+     worker (the caller):    server_next() --> server_answer(): resumes the connection
+     watching thread:        closes slow connections, and tells the worker when its client has left
+
+   One lock guards everything that the threads share. */
 #include "view/server.h"
 
 #include <arpa/inet.h>
@@ -25,7 +32,7 @@ struct server_job {
     struct MHD_Connection *connection;
     request request;
     answer answer;
-    bool is_answered; /* behind the lock until the connection is resumed */
+    bool is_answered; /* guarded by the lock until the connection is resumed */
     size_t body_bytes;
 };
 
@@ -33,7 +40,7 @@ struct server {
     struct MHD_Daemon *daemon;
     guard guard;
     const char *log_path;
-    sem_t wake; /* one post per job, and per server_wake() */
+    sem_t wake; /* posted once per job, and by server_wake() */
     pthread_mutex_t lock;
     server_job *waiting[SERVER_JOBS]; /* oldest first */
     int waiting_count;
@@ -41,7 +48,8 @@ struct server {
     bool is_closing;
     connections clients;
     connection_entry client_entries[SERVER_CONNECTIONS];
-    const struct MHD_Connection *working_for; /* the job that server_next() gave last; NULL: none */
+    const struct MHD_Connection *working_for; /* the connection of the job that server_next() returned last;
+                                                 NULL: none */
     atomic_bool nobody_waits;
     pthread_t watch;
     bool is_watched;
@@ -57,7 +65,7 @@ static void take_out(server *s, int i)
     memmove(s->waiting + i, s->waiting + i + 1, (size_t)(s->waiting_count - i) * sizeof *s->waiting);
 }
 
-/* With the lock held, and the connection suspended. */
+/* Call with the lock held and the connection suspended. */
 static void resume_with_text(server_job *job, int code, const char *text)
 {
     answer_text(&job->answer, code, text_plain, text);
@@ -65,7 +73,8 @@ static void resume_with_text(server_job *job, int code, const char *text)
     MHD_resume_connection(job->connection);
 }
 
-/* With the lock held. A new picture takes the place of one that nobody has begun: its page has moved on. */
+/* Append to the queue; call with the lock held. A new picture replaces one that still waits, because the page
+   no longer needs that one. */
 static bool put_in(server *s, server_job *job)
 {
     for (int i = 0; i < s->waiting_count && job->request.kind == REQUEST_RENDER; i++)
@@ -136,7 +145,7 @@ void server_set_status(server *s, char *json)
     pthread_mutex_unlock(&s->lock);
 }
 
-/* ---- the clients, watched in a thread ---- */
+/* ---- the thread that watches the clients ---- */
 
 static void *watch_clients(void *context)
 {
@@ -169,7 +178,7 @@ static void on_connection(void *context, struct MHD_Connection *connection, void
     pthread_mutex_unlock(&s->lock);
 }
 
-/* ---- requests, in the thread of libmicrohttpd ---- */
+/* ---- requests, in libmicrohttpd's thread ---- */
 
 static const char *query_word(void *query, const char *name)
 {
@@ -183,7 +192,7 @@ static void give_status(server *s, answer *out)
     pthread_mutex_unlock(&s->lock);
 }
 
-/* What the log has from a byte on; from the start again when it has become shorter. */
+/* The log from a byte on; the whole log if it is now shorter than that. */
 static void give_log(const server *s, struct MHD_Connection *connection, answer *out)
 {
     const char *from = query_word(connection, "from");
@@ -215,7 +224,7 @@ static enum MHD_Result refuse(const server *s, struct MHD_Connection *connection
     return http_send(connection, &s->guard, &text, false);
 }
 
-/* Send what is here, or put the job into the queue and let the connection wait. */
+/* Answer at once, or append a job to the queue and suspend the connection. */
 static enum MHD_Result begin(server *s, server_job *job, const char *path)
 {
     answer now = {0};
@@ -251,13 +260,13 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
                                   const char *method, const char *version, const char *body,
                                   size_t *body_bytes, void **state)
 {
-    PLAIN_NUMBERS; /* a thread begins with the program's locale */
+    PLAIN_NUMBERS; /* each thread starts with the program's locale */
     server *s = context;
     server_job *job = *state;
     const char *why;
     (void)version;
     (void)body;
-    if (job == NULL) { /* the head has come: no answer yet */
+    if (job == NULL) { /* first call: only the headers have arrived, and no answer may be sent yet */
         job = mem_calloc(1, sizeof *job, "request", NULL);
         *state = job;
         return job != NULL ? MHD_YES : MHD_NO;
@@ -268,7 +277,7 @@ static enum MHD_Result on_request(void *context, struct MHD_Connection *connecti
         connections_expect_taking(&s->clients, connection);
         pthread_mutex_unlock(&s->lock);
     }
-    if (*body_bytes > 0) { /* not read, and not for long */
+    if (*body_bytes > 0) { /* a request body is ignored, up to a limit */
         job->body_bytes += *body_bytes;
         *body_bytes = 0;
         return job->body_bytes <= BODY_BYTES_MAX ? MHD_YES : MHD_NO;
@@ -299,7 +308,7 @@ static void on_done(void *context, struct MHD_Connection *connection, void **sta
 
 static void on_message(void *context, const char *format, va_list words)
 {
-    /* about connections that broke: not our user's business */
+    /* about broken connections, which do not concern the user */
     (void)context;
     (void)format;
     (void)words;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/server.h -- HTTP: the page and small texts at once, all else as jobs for one worker, the newest
-   picture first to last. */
+/* view/server.h -- the HTTP server: sends the page and short texts at once, and queues everything else as
+   jobs for one worker. Of several waiting pictures only the newest is kept. */
 #ifndef GBT_VIEW_SERVER_H
 #define GBT_VIEW_SERVER_H
 
@@ -10,8 +10,9 @@
 #include "view/guard.h"
 #include "view/request.h"
 
-/** Fixed limits: connections at once, of one address, waiting jobs, bytes of a request's head, seconds for a
-   whole request since the connection began or the last answer ended, and to take a whole answer. */
+/** Fixed limits: connections in total and per client address; waiting jobs; bytes of a request's headers;
+    seconds for a whole request, counted from the start of the connection or the end of the last answer;
+    seconds to receive a whole answer. */
 enum {
     SERVER_CONNECTIONS = 32,
     SERVER_ADDRESS_CONNECTIONS = 24,
@@ -27,42 +28,44 @@ typedef struct server server;
 typedef struct server_job server_job;
 
 /**
- * Listen where the guard says.
+ * Listen at the guard's address.
  *
- * Only GET is answered, only with a Host that the guard knows (so that no foreign name can be made to mean
- * this server), only with the token where there is one, and nothing but the page itself to requests that a
- * browser marks as another site's.
+ * Requests are refused unless they are GET, have a Host header that the guard accepts (which excludes foreign
+ * names made to resolve to this server), and show the token if there is one. Requests that the browser marks
+ * as coming from another site get nothing but the page itself.
  *
  * @param g        [in] copied
  * @param port     [in] 0: any free one
- * @param log_path [in] file that /log?from=BYTE gives the rest of; empty: none. Borrowed
+ * @param log_path [in] file whose rest /log?from=BYTE returns; empty: none. Borrowed
  * @return GBT_OK, GBT_ERR_IO (the port is in use, the address is not this machine's), GBT_ERR_NO_MEMORY
  */
 gbt_status server_start(const guard *g, int port, const char *log_path, server **out, gbt_error *err);
 int server_port(const server *s);
 
-/** Give up what waits (503), close, free. Every job that server_next() gave must have been answered. */
+/** Refuse the waiting jobs (503), close, free. Every job that server_next() returned must have been answered.
+ */
 void server_stop(server *s);
 
-/** What /status says from now on: JSON, taken over, mem_free(). NULL: stays as it is. */
+/** Set the answer to /status: JSON, allocated by mem_alloc(); the server takes ownership. NULL: no change. */
 void server_set_status(server *s, char *json);
 
-/** The oldest waiting job, for at most so many seconds; NULL: none, or server_wake(). Its request stays valid
+/** Wait for the oldest job, at most `seconds`. NULL after a timeout or server_wake(). Its request stays valid
     until it is answered. */
 server_job *server_next(server *s, double seconds);
 const request *server_request(const server_job *job);
 
-/** True, in place, as soon as whoever asked for the job of the last server_next() has left, or the program is
-   to stop: what is made for it may stop. */
+/** A flag that becomes true when the client of the last job from server_next() has disconnected, or the
+    program is to stop: work on that job can be abandoned. */
 const atomic_bool *server_nobody_waits(const server *s);
 
-/** In place of SERVER_REQUEST_SECONDS and SERVER_ANSWER_SECONDS, for what begins from now on. For tests. */
+/** Replace SERVER_REQUEST_SECONDS and SERVER_ANSWER_SECONDS for all deadlines that start from now on. For
+    tests. */
 void server_set_patience(server *s, double seconds);
 
-/** Send; the answer's bytes are taken over. */
+/** Send an answer; its bytes become the server's. */
 void server_answer(server *s, server_job *job, const answer *with);
 
-/** Let server_next() return. May be called in a signal handler. */
+/** Make server_next() return. May be called from a signal handler. */
 void server_wake(server *s);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/studio.c -- open, follow, prepare; the picture itself is made in picture.c. */
+/* view/studio.c -- open the run, follow its training, prepare views. Pictures are made in picture.c. */
 #include "view/studio.h"
 
 #include <jansson.h>
@@ -21,7 +21,7 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
            a->st_mtim.tv_nsec == b->st_mtim.tv_nsec;
 }
 
-/* With photos when they can be had; `note` says why they cannot. */
+/* Open the run with its photos if they can be found; otherwise `note` says why not. */
 static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_size, gbt_error *err)
 {
     gbt_error first = {0};
@@ -123,7 +123,7 @@ bool studio_follow(studio *s)
         return false;
     if (reopen(s, &file, &err) == GBT_OK)
         return true;
-    s->loaded = file; /* said once for each file */
+    s->loaded = file; /* so that the failure is reported once per file */
     snprintf(s->note, sizeof s->note, "%s", err.text);
     log_warn("%s", err.text);
     return false;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/studio.h -- what is being looked at: the run that is open now, a newer one when training has saved it,
+/* view/studio.h -- what the viewer shows: the open run, which is replaced when training saves a newer model,
    and its last picture. */
 #ifndef GBT_VIEW_STUDIO_H
 #define GBT_VIEW_STUDIO_H
@@ -11,9 +11,9 @@
 #include "view/answer.h"
 #include "view/request.h"
 
-/** Which picture the frame's tree was built for. Zeroed before it is filled: compared as bytes. */
+/** What the frame's tree was built for. Zeroed before it is filled, because it is compared as bytes. */
 typedef struct studio_picture {
-    gbt_camera camera; /* scene-local, through the middle of the pixels */
+    gbt_camera camera; /* scene-local, without a shift within the pixels */
     gbt_renderer renderer;
     gbt_preset preset;
     float background[3], t_near;
@@ -22,47 +22,48 @@ typedef struct studio_picture {
 
 typedef struct studio {
     const char *input, *data;              /* borrowed */
-    char model_path[4096], log_path[4096]; /* log_path: empty when there is none */
-    struct stat loaded;                    /* of the model file that is open */
-    gbt_renderer trained;                  /* what the model was trained to be drawn with, and in front of */
+    char model_path[4096], log_path[4096]; /* log_path: empty if there is none */
+    struct stat loaded;                    /* of the open model file, to notice a newer one */
+    gbt_renderer trained; /* trained, background: the renderer and background that the model was trained with
+                           */
     float background[3];
     loaded_run *run;         /* NULL: nothing has been saved yet */
-    int64_t started;         /* microseconds: tells a page that another viewer answers it now */
-    unsigned version;        /* 1, 2, ... counts what was opened */
-    char note[600];          /* for people: why there is no picture, or no photo; empty: all is well */
-    const atomic_bool *stop; /* optional (NULL): once true a picture that is being drawn is given up;
-                                borrowed */
+    int64_t started;         /* microseconds: lets a page notice that another viewer process answers now */
+    unsigned version;        /* 1, 2, ...: counts the models opened */
+    char note[600];          /* shown to the user: why there is no picture, or no photo; empty: all is well */
+    const atomic_bool *stop; /* optional (NULL), borrowed: once true, the current picture is abandoned */
     studio_picture last;
-    bool drawn; /* the frame's picture is that of `last` too, not the tree alone */
+    bool drawn; /* the frame holds the picture of `last`, not only its tree */
 } studio;
 
 /**
- * Open INPUT, or make ready to wait for the first model of a run that is being trained.
+ * Open INPUT, or prepare to wait for the first model of a run that is being trained.
  *
- * A model whose data set is not there is shown without photos, unless `data` names one.
+ * If the model's data set is missing and `data` names no other, the model is shown without photos.
  * @param out [out] start from {0}; free with studio_close() after success or failure
  */
 gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err);
 void studio_close(studio *s);
 
-/** Open the model again if its file is another one now; when that fails the old one stays and `note` says
-    why. True: there is a new one. */
+/** Open the model again if its file has been replaced, and return true. If that fails the old one stays and
+    `note` says why. */
 bool studio_follow(studio *s);
 
-/** What the page polls: version, counts, log, note. JSON; free with mem_free(). NULL without memory. */
+/** The status that the page polls: version, counts, log, note. JSON; free with mem_free(). NULL if out of
+    memory. */
 char *studio_status(const studio *s);
 
-/** Answer any request of the page; a failure becomes an answer too. */
+/** Answer any request of the page; a failure is an answer too. */
 void studio_answer(studio *s, const request *what, answer *out);
 
-/* ---- inside the room ---- */
+/* ---- for the files of this folder ---- */
 
-/** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that is not there, and for one of more
-    pixels than a picture may have unless its photo is asked for. */
+/** The camera of a request, scene-local. GBT_ERR_ARGUMENT for a view that does not exist, and for a size
+    above the limits, which do not apply to photos. */
 gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err);
 
-/** Make the frame's tree that of `camera`, drawn as `what` says, and with `draw` its picture too, unless they
-    are. */
+/** Build the frame's tree for `camera` with the settings of `what`, and with `draw` render its picture too.
+    Does nothing if both are up to date. */
 gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw,
                           gbt_error *err);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/studio_answer.c -- which part of the studio answers which request. */
+/* view/studio_answer.c -- dispatch requests to the parts of the studio. */
 #include "view/studio.h"
 
 void studio_answer(studio *s, const request *what, answer *out)

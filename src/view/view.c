@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/view.c -- the page's server from start to Ctrl-C. */
+/* view/view.c -- gbtrace view: run the page's server from start to Ctrl-C. */
 #include "gbtrace/view.h"
 
 #include "base/clock.h"
@@ -11,7 +11,7 @@
 #include "view/server.h"
 #include "view/studio.h"
 
-static const double look_every_seconds = 1; /* for a newer model */
+static const double look_every_seconds = 1; /* how often to look for a newer model */
 
 gbt_view_def gbt_view_def_default(void) { return (gbt_view_def){.port = 8470, .cookie_ = DEF_COOKIE}; }
 

@@ -91,7 +91,7 @@ static const option *options_bench(int *count)
 static int run_bench(const operands *given)
 {
     gbt_error err = {0};
-    (void)given; /* one word, which options_parse() has compared */
+    (void)given; /* one word, already checked by options_parse() */
     if (def.model == NULL)
         return command_misused("bench trace: --model is missing (wanted --model FILE|RUN)");
     return command_failed(lab_bench_trace(&def, stdout, &err), &err);

@@ -58,7 +58,7 @@ static const option *options(int *count)
     return rows;
 }
 
-/* Whether a run is of the scene beside it, as its file data_places says in its last line. */
+/* Whether a run was trained on the scene beside it: the last line of its file data_places says so. */
 static bool is_of_scene(const char *run_folder)
 {
     char path[4200], line[4200] = "";
@@ -74,7 +74,7 @@ static bool is_of_scene(const char *run_folder)
 
 static int run(const operands *given)
 {
-    (void)given; /* it takes none */
+    (void)given; /* takes no operands */
     char data[4096], run_folder[4096], command_line[8400];
     if (snprintf(data, sizeof data, "%s/scene", out) >= (int)sizeof data ||
         snprintf(run_folder, sizeof run_folder, "%s/run", out) >= (int)sizeof run_folder)

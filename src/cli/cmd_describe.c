@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/cmd_describe.c -- gbtrace describe: the manual page, the completion scripts. */
+/* cli/cmd_describe.c -- gbtrace describe: write the manual page or a completion script. */
 #include <string.h>
 
 #include "cli/describe.h"

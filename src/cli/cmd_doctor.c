@@ -11,9 +11,9 @@
 
 static const char *const level_names[] = {"ok", "warn", "fail"};
 
-/* ---- variables that nobody reads ---- */
+/* ---- environment variables that set nothing ---- */
 
-/** Whether NAME=VALUE sets an option of some command. */
+/** Whether a variable, NAME=VALUE, sets an option of some command. */
 static bool sets_option(const char *variable)
 {
     for (int c = 0; c < command_list_count; c++) {
@@ -40,7 +40,7 @@ static void check_environment(gbt_diagnosis *d)
     *c = (gbt_check){.name = "environment"};
     for (char **variable = environ; *variable != NULL; variable++) {
         if (strncmp(*variable, "GBTRACE_", 8) != 0 || strncmp(*variable, "GBTRACE_LIBRARY=", 16) == 0)
-            continue; /* the latter is of the Python package */
+            continue; /* the latter belongs to the Python package */
         const bool found = sets_option(*variable);
         known += found;
         unknown += !found;
@@ -93,7 +93,7 @@ static const option *options(int *count)
 
 static int run(const operands *given)
 {
-    static gbt_diagnosis d; /* 16 kB */
+    static gbt_diagnosis d; /* 16 kB, too much for the stack */
     gbt_error err = {0};
     const gbt_status status = gbt_doctor(given->count > 0 ? given->value[0] : ".", &d, &err);
     if (status != GBT_OK)

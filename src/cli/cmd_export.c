@@ -87,6 +87,6 @@ const command command_export = {
     .usage = "RUN|MODEL.gbt|GAUSSIANS OUT...",
     .options = options,
     .min_operands = 1,
-    .max_operands = 17, /* what is read, and the 16 outputs that gbt_export() takes */
+    .max_operands = 17, /* the input, and the 16 outputs that gbt_export() takes */
     .run = run,
     .endings = format_words};

@@ -65,7 +65,7 @@ static int run(const operands *given)
         kind++;
     def.kind = (gbt_query_kind)kind;
     const gbt_status status = gbt_query(given->value[1], &def, stdout, &err);
-    return ferror(stdout) ? 0 : command_failed(status, &err); /* main() says what is wrong with stdout */
+    return ferror(stdout) ? 0 : command_failed(status, &err); /* main() reports failures of stdout */
 }
 
 const command command_query = {.name = "query",

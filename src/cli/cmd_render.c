@@ -7,7 +7,7 @@
 #include "cli/options.h"
 #include "gbtrace/evaluate.h"
 
-/** "1280x720", nothing more. */
+/** "1280x720" and nothing else. */
 static bool read_size(const char *text, int *width, int *height)
 {
     int used = 0;
@@ -153,7 +153,8 @@ static const option *options(int *count)
     return rows;
 }
 
-/* RUN/renders/test holds the scored pictures, so no others may go there. */
+/* Whether pictures come out as when the run was scored. RUN/renders/test holds the scored pictures, so only
+   these may be written there by default. */
 static bool draws_as_the_run(void)
 {
     const gbt_render_def own = gbt_render_def_default();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/cmd_study.c -- gbtrace study: measurements that a chart is made of. */
+/* cli/cmd_study.c -- gbtrace study: measurements that make a chart. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,11 +7,11 @@
 #include "gbtrace/cluster.h"
 #include "lab/lab.h"
 
-/* What the command line says, for all studies. */
+/* The parsed command line, for all studies. */
 typedef struct study_request {
-    lab_study_def def; /* of the studies of models */
+    lab_study_def def; /* for studies of models */
     lab_stability_def stability;
-    lab_runs_def runs; /* of those that train */
+    lab_runs_def runs; /* for studies that train */
     const char *folder;
 } study_request;
 
@@ -64,7 +64,7 @@ static const command_word study_words[STUDY_COUNT + 1] = {
 static const struct {
     int models_min, models_max;
     gbt_status (*run)(const study_request *, gbt_error *);
-    bool shares_work; /* as of a command */
+    bool shares_work; /* as in `command` */
 } studies[STUDY_COUNT] = {{1, 16, run_speed, false}, {1, 16, run_crosscheck, false},
                           {1, 6, run_rate, false},   {0, 0, run_stability, false},
                           {1, 16, run_paper, true},  {1, 16, run_time, true},
@@ -196,7 +196,8 @@ static const option *options(int *count)
 static int run(const operands *given)
 {
     size_t which = 0;
-    while (strcmp(given->value[0], study_words[which].name) != 0) /* options_parse() takes no others */
+    while (strcmp(given->value[0], study_words[which].name) != 0) /* ends, since options_parse() accepts no
+                                                                     other word */
         which++;
     if (given->count - 1 < studies[which].models_min)
         return command_misused("study %s: wanted a model, or data to train on", study_words[which].name);

@@ -57,8 +57,8 @@ static int run(const operands *given)
     const bool by_count = options_typed(&def.iterations), by_time = options_typed(&def.budget_seconds);
     if (by_count && by_time && def.iterations > 0 && def.budget_seconds > 0)
         return command_misused("--budget: not with --iterations");
-    /* A file or variable speaks of all runs: it sets no length of one that is resumed, and gives way to a
-       length that was typed. */
+    /* A length of training set in a configuration file or variable is meant for runs in general: it does not
+     * apply to a resumed run, and a length on the command line replaces it. */
     if ((def.resume || by_time) && !by_count)
         def.iterations = 0;
     if (def.resume && !by_time)

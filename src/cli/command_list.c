@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/command_list.c -- which subcommands there are. A new one is a file cmd_NAME.c, a line in command.h and
-   a line here. */
+/* cli/command_list.c -- the list of subcommands. To add one: a file cmd_NAME.c, its variable in command.h,
+   and an entry here. */
 #include "cli/command.h"
 
 const command *const command_list[] = {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/describe.c -- what the forms of the command line have in common. */
+/* cli/describe.c -- code shared by the manual page and the completion scripts. */
 #include "cli/describe.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/describe_bash.c -- completion for bash. */
+/* cli/describe_bash.c -- the completion script for bash. */
 #include "cli/describe.h"
 
 static void write_names(const command *self, const option_table *t, FILE *out)
@@ -16,7 +16,7 @@ static void write_pattern(FILE *out, const command *self, const option *o)
 {
     char before[64];
     snprintf(before, sizeof before, "|%s:", self->name);
-    fputs("    (''", out); /* so that every name may start with a bar */
+    fputs("    (''", out); /* an empty pattern first, so that every name can be preceded by a bar */
     describe_names(out, o, before, true);
     fputs(") ", out);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/describe_fish.c -- completion for fish. */
+/* cli/describe_fish.c -- the completion script for fish. */
 #include "cli/describe.h"
 
 static void write_note(FILE *out, const char *text)

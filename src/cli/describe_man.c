@@ -3,7 +3,7 @@
 #include "cli/describe.h"
 #include "gbtrace/version.h"
 
-/* One line of text: nothing in it is a request or an escape of roff. */
+/* Write one line of text, escaped so that roff sees no request or escape sequence in it. */
 static void write_text(FILE *out, const char *text)
 {
     if (*text == '.' || *text == '\'')

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/describe_zsh.c -- completion for zsh. */
+/* cli/describe_zsh.c -- the completion script for zsh. */
 #include "cli/describe.h"
 
 #include <string.h>
 
-/* Text inside '...[text]...': a quote ends the string, brackets and colons end the text. */
+/* Write text for '...[text]...', where a quote would end the string, and a bracket or colon the text. */
 static void write_note(FILE *out, const char *text)
 {
     for (; *text != '\0'; text++)

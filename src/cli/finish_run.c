@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/finish_run.c -- a small model, scores, a report. */
+/* cli/finish_run.c -- what follows training: compress the model, score it, write the report. */
 #include "cli/finish_run.h"
 
 #include <stdio.h>

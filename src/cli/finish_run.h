@@ -8,12 +8,12 @@
 #include "gbtrace/status.h"
 
 /**
- * Make RUN/model.gbt small, unless the run is lossless; then score the held-out views with what it gives
- * back, and write the report; with `tensorboard`, scores and pictures for it too.
+ * Compress RUN/model.gbt, unless the run is lossless. Then score the held-out views with the compressed model
+ * and write the report; with `tensorboard`, write scores and pictures for TensorBoard too.
  */
 gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err);
 
-/** Say on stdout where the report is and what shows the scene, to a person (progress_for_people()). */
+/** Print where the report is and how to view the scene, unless no person reads it (progress_for_people()). */
 void finish_run_say(const char *run);
 
 #endif

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/json_write.c -- a text and a number as JSON. */
+/* cli/json_write.c -- write a string or a number as JSON. */
 #include <math.h>
 #include <stddef.h>
 
 #include "cli/progress.h"
 
-/** Bytes of the UTF-8 character at `s`, 1 to 4; 0 when there is none (a stray byte, too long a form, a
-    surrogate). */
+/** Length in bytes of the UTF-8 character at `s`, 1 to 4; 0 if it is invalid (a stray byte, an overlong form,
+    a surrogate). */
 static int character_length(const unsigned char *s)
 {
     const int length = s[0] < 0x80                   ? 1

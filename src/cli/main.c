@@ -66,7 +66,7 @@ static int run(const command *self, int argc, char **argv)
     gbt_error err = {0};
     const char *folder = getenv("TMPDIR");
     if (folder == NULL || folder[0] == '\0')
-        folder = "/var/tmp"; /* not /tmp, which may be memory itself */
+        folder = "/var/tmp"; /* not /tmp, which may be kept in memory (tmpfs) */
     if (options_memory > 0 && gbt_set_memory(options_memory, folder, &err) != GBT_OK)
         return command_failed(err.status, &err);
     const int done = self->run(&given);
@@ -94,7 +94,7 @@ static int dispatch(int argc, char **argv)
     return found == NULL ? unknown(verb) : run(found, argc - 2, argv + 2);
 }
 
-/* Other threads may be at work, so not exit(). */
+/* _exit() rather than exit(), whose handlers are unsafe while other threads run. */
 static void end_without_memory(void)
 {
     const int code = gbt_status_exit_code(GBT_ERR_NO_MEMORY);
@@ -106,17 +106,17 @@ static void end_without_memory(void)
 int main(int argc, char **argv)
 {
     gbt_when_out_of_memory(end_without_memory);
-    signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is a failed write: one line, and nothing left behind
-                               */
-    signal(SIGCHLD, SIG_DFL); /* where it is ignored, nobody knows how ffmpeg and COLMAP have ended */
-    signal(SIGPIPE, SIG_IGN); /* a training goes on when nobody reads its progress any longer */
+    signal(SIGXFSZ, SIG_IGN); /* exceeding the file size limit becomes an ordinary write error */
+    signal(SIGCHLD, SIG_DFL); /* if it were ignored, the exit codes of ffmpeg and COLMAP would be lost */
+    signal(SIGPIPE, SIG_IGN); /* training continues when nobody reads its progress any more */
     gbt_error alone = {0};
     const gbt_status joined = gbt_cluster_open(&alone);
     int code = joined == GBT_OK ? dispatch(argc, argv) : command_failed(joined, &alone);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == 0) { /* a full disk must not look like success */
         gbt_error err = {.status = GBT_ERR_IO};
         snprintf(err.text, sizeof err.text, "standard output: write failed: %s", strerror(errno));
-        code = errno == EPIPE ? 128 + SIGPIPE : command_failed(GBT_ERR_IO, &err); /* head has read enough */
+        code = errno == EPIPE ? 128 + SIGPIPE : command_failed(GBT_ERR_IO, &err); /* the reader, such as head,
+                                                                                     has read enough */
     }
     progress_end(code);
     gbt_cluster_close(code, progress_last_error());

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/option_fields.c -- fields that errors of the library name, as the options that set them. */
+/* cli/option_fields.c -- replace field names in the library's error messages by the options that set them. */
 #include <stdio.h>
 #include <string.h>
 
@@ -7,12 +7,12 @@
 
 static const option_table none;
 
-/** The table of the command that runs; an empty one before one does. */
+/** The table of the running command; empty before it is known. */
 static const option_table *running = &none;
 
 void options_set_fields(const option_table *t) { running = t; }
 
-/** The option of the field at `name`; NULL: the command has none. */
+/** The option that sets the field at `name`; NULL if the command has none. */
 static const option *option_of(const char *name, size_t length)
 {
     for (int row = 0; length > 0 && row < running->own; row++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/option_help.c -- what a row says for a person: its names, its value, its default; and the help that is
-   made of them. */
+/* cli/option_help.c -- the help of a command: names, values and defaults of its options, as people read them.
+ */
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -20,7 +20,7 @@ const char *options_value_name(const option *o)
     return !options_takes_value(o) ? "" : o->kind == OPTION_CHOICE ? o->choices : o->value_name;
 }
 
-/** Whether `name` is `typed`, where _ may stand for -. */
+/** Whether `name` equals `typed`, in which _ may stand for -. */
 static bool same_name(const char *name, size_t name_length, const char *typed, size_t length)
 {
     if (name_length != length)
@@ -69,7 +69,7 @@ int options_find(const option *options, int option_count, const char *name, size
     return -1;
 }
 
-/* ---- notes ---- */
+/* ---- values and defaults ---- */
 
 static void add(char *out, size_t size, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
@@ -93,7 +93,7 @@ static void add_duration(char *out, size_t size, double seconds)
 static void add_size(char *out, size_t size, double bytes)
 {
     int unit = 0;
-    if (bytes <= 0) /* no default */
+    if (bytes <= 0) /* 0 means no default */
         return;
     while (unit < 4 && bytes >= 1024) {
         bytes /= 1024;
@@ -102,7 +102,7 @@ static void add_size(char *out, size_t size, double bytes)
     add(out, size, " (default %g%.*s)", bytes, unit > 0, unit > 0 ? &"KMGT"[unit - 1] : "");
 }
 
-/** What stands for "as it was trained" has no name. */
+/** The choice at `index` as default; nothing for an index outside the list, such as GBT_..._AS_TRAINED. */
 static void add_choice(char *out, size_t size, const char *choices, int index)
 {
     const char *name = choices;
@@ -132,7 +132,7 @@ static void add_default(const option *o, char *out, size_t size)
         add(out, size, " (default %g)", (double)*(const float *)o->value);
         return;
     case OPTION_DOUBLE:
-        if (!isnan(*(const double *)o->value)) /* else its help says it */
+        if (!isnan(*(const double *)o->value)) /* its help text describes the default */
             add(out, size, " (default %g)", *(const double *)o->value);
         return;
     case OPTION_DURATION:
@@ -153,7 +153,7 @@ static void add_default(const option *o, char *out, size_t size)
     }
 }
 
-/** Help that tells what 0 stands for says enough of the default 0. */
+/** Whether the help already explains the value 0, so that "(default 0)" would add nothing. */
 static bool explains_zero(const option *o, const char *note)
 {
     const char *zero = strstr(o->help, "0: ");
@@ -184,7 +184,7 @@ void options_notes(const option *o, bool names, char *out, size_t size)
 
 enum { HELP_COLUMNS = 100, HELP_INDENT = 30, WORD_WIDTH = 12 };
 
-/** `text` from column `at` on, its further lines indented. */
+/** Print `text`, whose first line starts at column `at`, wrapped; further lines are indented. */
 static void print_wrapped(const char *text, int at)
 {
     bool first = true;

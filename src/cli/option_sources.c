@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/option_sources.c -- options from where they stand for longer than one command line: a configuration
-   file, the environment. */
+/* cli/option_sources.c -- options from persistent sources: a configuration file, the environment. */
 #include <ctype.h>
 #include <errno.h>
 #include <stdio.h>
@@ -12,7 +11,8 @@
 
 enum { GO_ON = -1, CONFIG_LIMIT = 1 << 20 };
 
-/* Rows without a value of their own are spellings of other rows, for command lines. */
+/* Not allowed are rows that only explain options of other programs, and rows with a fixed value, which are
+   alternative spellings for the command line. */
 static bool may_stand_here(const option *o) { return o->kind != OPTION_ELSEWHERE && o->fixed == NULL; }
 
 /* ---- the configuration file ---- */
@@ -27,7 +27,7 @@ static int config_failed(gbt_status status, const char *path, int line, const ch
     return command_failed(status, &err);
 }
 
-/** The file's text, zero-terminated; kept to the end of the program, because options point into it. */
+/** Read the file as a zero-terminated string. It is never freed, because options point into it. */
 static int read_config_file(const char *path, char **text)
 {
     static char buffer[CONFIG_LIMIT + 1];
@@ -52,7 +52,7 @@ static int read_config_file(const char *path, char **text)
     return GO_ON;
 }
 
-/** Blanks off both ends, in place. */
+/** Strip blanks from both ends, in place. */
 static char *trim(char *text)
 {
     text += strspn(text, " \t\r");
@@ -62,7 +62,8 @@ static char *trim(char *text)
     return text;
 }
 
-/** The row that a line names, or -1: also `grow` for --no-grow, which it then says the inverse of. */
+/** The option that a line names, or -1. Also finds --no-grow by its field `grow`, whose value is the inverse.
+ */
 static int find_configured(const option *options, int option_count, const char *name, bool *is_inverse)
 {
     const size_t length = strlen(name);
@@ -103,7 +104,7 @@ int options_read_config(const char *path, const option *options, int option_coun
         if (given[i])
             return config_failed(GBT_ERR_FORMAT, path, line, ": given twice", name);
         if (value[0] == '\0' && options[i].kind == OPTION_STRING)
-            continue; /* no text, which is what a run says of an option that it was not given */
+            continue; /* an empty string: how RUN/config records an option that was not given */
         given[i] = true;
         char wanted[OPTIONS_WANTED_SIZE], what[2 * OPTIONS_WANTED_SIZE] = ": ";
         option row = options[i];

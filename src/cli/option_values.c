@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/option_values.c -- the text of one option to its value: strict, without locale, within its range. */
+/* cli/option_values.c -- parse the value of one option: strictly, independent of the locale, within its
+   range. */
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
@@ -12,8 +13,8 @@
 
 enum { CHOICES_MAX = 16 };
 
-/** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. No hex, nan, inf or
-    blanks. */
+/** Length of [+-]digits[.digits][e[+-]digits] at the start of `text`; 0 if there is none. Excludes
+    hexadecimal numbers, nan, inf and blanks, which strtod() would accept. */
 static size_t decimal_length(const char *text)
 {
     size_t i = text[0] == '+' || text[0] == '-' ? 1 : 0, digits = 0;
@@ -42,7 +43,7 @@ static bool read_decimal(const char *text, double min, double max, double *out)
     const size_t length = decimal_length(text);
     if (length == 0 || text[length] != '\0')
         return false;
-    *out = strtod(text, NULL); /* the program never leaves the C locale */
+    *out = strtod(text, NULL); /* safe, because the program never leaves the C locale */
     return isfinite(*out) && *out >= min && *out <= max;
 }
 
@@ -66,7 +67,7 @@ static bool read_uint64(const char *text, double min, double max, uint64_t *out)
     return errno == 0 && ((min == 0 && max == 0) || ((double)*out >= min && (double)*out <= max));
 }
 
-/* From large to small. */
+/* In descending order. */
 static const struct {
     const char *names;
     double seconds;
@@ -87,7 +88,7 @@ static int find_time_unit(const char *name, size_t length)
     return -1;
 }
 
-/** "90", "90s", "10m", "10min", "1h30m": parts from large to small, each unit once. */
+/** A duration such as 90, 90s, 10m, 10min or 1h30m: units in descending order, each at most once. */
 static bool read_duration(const char *text, double min, double max, double *out)
 {
     double sum = 0;
@@ -101,7 +102,7 @@ static bool read_duration(const char *text, double min, double max, double *out)
         size_t name_length = 0;
         while (isalpha((unsigned char)text[length + name_length]))
             name_length++;
-        if (text[length] == '\0' && next > 0) /* a bare number is seconds only when it stands alone */
+        if (text[length] == '\0' && next > 0) /* a number without a unit means seconds, but only alone */
             return false;
         const int unit = text[length] == '\0' ? TIME_UNITS - 1 : find_time_unit(text + length, name_length);
         if (unit < next)
@@ -133,7 +134,7 @@ static bool read_size(const char *text, double min, double max, size_t *out)
     return true;
 }
 
-/** Where `text` stands among "a|b|c"; -1: nowhere. */
+/** The index of `text` in "a|b|c", or -1. */
 static int find_choice(const char *choices, const char *text)
 {
     const size_t length = strlen(text);

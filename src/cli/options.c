@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/options.c -- the command line to the places that a table of options names. */
+/* cli/options.c -- parse a command line into the variables that a table of options names.
+
+   Sources, from weak to strong: --config FILE, GBTRACE_NAME, GBTRACE_COMMAND_NAME, the command line. The
+   command line is read twice: first for the common options, which include --config, then in full. */
 #include "cli/options.h"
 
 #include <stdint.h>
@@ -26,7 +29,7 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err)
     return err->status;
 }
 
-/* ---- the table: a command's own rows, then those that every command has ---- */
+/* ---- the table: a command's own rows, then the common ones ---- */
 
 static const char progress_modes[] = "auto|json|none";
 static const char *config_path, *first_operand;
@@ -105,11 +108,11 @@ static int unknown_option(const char *typed, const option_table *t)
     return command_misused("%.100s: unknown option (see --help)", typed);
 }
 
-/** One argument taken apart. */
+/** One argument, split into its parts. */
 typedef struct argument {
-    int index;         /* of the option; -1: not an option */
-    const char *label; /* as the user wrote it, without a value */
-    const char *value; /* behind =, or NULL */
+    int index;         /* row of the option; -1: not an option */
+    const char *label; /* as the user typed it, without a value */
+    const char *value; /* the text after =, or NULL */
 } argument;
 
 static int take_apart(char *text, const option_table *t, argument *out)
@@ -119,7 +122,7 @@ static int take_apart(char *text, const option_table *t, argument *out)
     if (text[0] != '-' || text[1] == '\0')
         return GO_ON;
     const size_t dashes = text[1] == '-' ? 2 : 1, length = strcspn(text + dashes, "=");
-    if ((dashes == 2) == (length > 1)) /* one letter goes with one dash */
+    if ((dashes == 2) == (length > 1)) /* one letter goes with one dash, longer names with two */
         out->index = options_find(t->rows, t->count, text + dashes, length);
     if (out->index < 0 || (dashes == 1 && text[2] != '\0'))
         return unknown_option(text, t);
@@ -128,8 +131,8 @@ static int take_apart(char *text, const option_table *t, argument *out)
     return GO_ON;
 }
 
-/** The value of an argument: behind =, or the next argument, which it then takes. Two dashes do not start a
-    value: one was forgotten. */
+/** The value of an option: the text after =, or else the next argument, which is consumed. An argument that
+    begins with two dashes is not taken as a value, since most likely the value was forgotten. */
 static const char *take_value(const argument *a, int argc, char **argv, int *i)
 {
     if (a->value != NULL)
@@ -164,8 +167,8 @@ static int apply(const argument *a, const option *o, int argc, char **argv, int 
 /**
  * Go through the arguments once.
  *
- * @param common [in]  true: apply the common options alone, which the rest is read by; false: apply
- *                     everything
+ * @param common [in]  true: apply only the common options, which decide how the rest is read; false: apply
+ * all
  * @param given  [out] [t->count]
  */
 static int walk(const option_table *t, bool common, int argc, char **argv, bool *given, operands *out)
@@ -206,7 +209,7 @@ static int walk(const option_table *t, bool common, int argc, char **argv, bool 
     return GO_ON;
 }
 
-/* ---- is everything there ---- */
+/* ---- completeness ---- */
 
 static void put_first(operands *out, const char *value)
 {
@@ -236,7 +239,8 @@ static int check_words(const command *self, const char *typed)
                            nearest != NULL ? "?" : "");
 }
 
-/* What was typed belongs to the first operand. Files and variables may say more, for other uses. */
+/* Refuse options on the command line that do not apply to the first operand. Files and variables may set
+   them, because other calls use these too. */
 static int check_belongs(const command *self, const option_table *t, const bool *typed, const operands *out)
 {
     for (int i = 0; i < t->own && out->count > 0; i++) {
@@ -268,7 +272,7 @@ static int check_complete(const command *self, const option_table *t, const bool
 
 /* ---- entry ---- */
 
-/** The table of the command that runs, and which of its rows were on the command line. */
+/** The table of the running command, and which of its rows were on the command line. */
 static option_table current;
 static bool typed[TABLE_MAX];
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/progress.c -- events as JSON lines, or fewer of them. */
+/* cli/progress.c -- messages on stderr: as text, as JSON lines, or none. */
 #include "cli/progress.h"
 
 #include <stdarg.h>
@@ -63,7 +63,7 @@ void progress_start(progress_mode mode, const char *command_name)
     as_json = mode == PROGRESS_JSON;
     silent = mode == PROGRESS_NONE;
     if (as_json) {
-        setvbuf(stderr, NULL, _IOLBF, BUFSIZ); /* a line at a time: readers see whole objects */
+        setvbuf(stderr, NULL, _IOLBF, BUFSIZ); /* line-buffered, so that readers always see whole objects */
         fputs("{\"event\": \"start\", \"schema\": 1, \"command\": ", stderr);
         json_write_text(stderr, command_name);
         fprintf(stderr, ", \"version\": \"%s\"}\n", gbt_version());
@@ -93,7 +93,8 @@ void progress_error(const char *text)
     const char *kind = getenv("TERM");
     const bool over = isatty(STDERR_FILENO) && kind != NULL && strcmp(kind, "dumb") != 0;
     if (!as_json)
-        fprintf(stderr, "%serror: %s\n", over ? "\r\033[K" : "", text); /* progress may stand there */
+        fprintf(stderr, "%serror: %s\n", over ? "\r\033[K" : "", text); /* first clear a progress line that
+                                                                           may stand there */
 }
 
 const char *progress_last_error(void) { return last_error[0] != '\0' ? last_error : NULL; }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/report.c -- the one line of an error, and the guess at what a mistyped name should have been. */
+/* cli/report.c -- print errors as one line, and suggest the name that a mistyped one may have meant. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -46,8 +46,8 @@ enum { NAME_LIMIT = 40 };
 
 static int smaller(int a, int b) { return a < b ? a : b; }
 
-/** Insertions, deletions, replacements and swaps of neighbours that make `b` of `a`; both shorter than
-    NAME_LIMIT. */
+/** Restricted Damerau-Levenshtein distance: insertions, deletions, substitutions and swaps of neighbours that
+   turn `a` into `b`. Both are shorter than NAME_LIMIT. */
 static int edit_distance(const char *a, const char *b)
 {
     const int m = (int)strlen(a), n = (int)strlen(b);
@@ -71,7 +71,7 @@ const char *command_nearest(const char *typed, const char *const *names, int cou
     const int length = (int)strnlen(typed, NAME_LIMIT);
     if (length == 0 || length == NAME_LIMIT)
         return NULL;
-    int best = length / 3 + 2; /* further away it would be a guess, not a help */
+    int best = length / 3 + 2; /* beyond this distance a suggestion would be a mere guess */
     const char *nearest = NULL;
     for (int i = 0; i < count; i++) {
         if (strlen(names[i]) >= NAME_LIMIT)

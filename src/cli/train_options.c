@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cli/train_options.c -- the options of a training run: the library's settings, and what people type who come
-   from other programs. */
+/* cli/train_options.c -- the options of a training run: the library's settings, and options of other
+   programs, for which a message says what to use here. */
 #include "cli/train_options.h"
 
 #include <stdio.h>
@@ -10,9 +10,9 @@
 
 #define RATES(of) of "-lr-init " of "-lr-final " of "-lr-delay-mult " of "-lr-max-steps "
 
-/* Other programs have these. */
+/* Options of other programs. */
 static const option elsewhere[] = {
-    /* What people type who come from 3DGS and Scaffold-GS. */
+    /* 3DGS and Scaffold-GS. */
     {.name = "images",
      .kind = OPTION_ELSEWHERE,
      .aliases = "i",
@@ -135,7 +135,8 @@ int train_options(gbt_train_def *def, option *out)
     for (size_t i = 0; i < gbt_train_setting_count(); i++, count++) {
         const gbt_train_setting *s = gbt_train_setting_at(i);
         out[count] = row_of(s, (char *)def + s->offset);
-        if (out[count].kind == OPTION_FLAG_OFF) { /* a setting that is on is turned off: --no-NAME */
+        if (out[count].kind == OPTION_FLAG_OFF) { /* a setting that is on by default gets an option that turns
+                                                     it off */
             snprintf(names[count], NAME_SIZE, "no-%s", out[count].name);
             out[count].name = names[count];
         }

@@ -6,14 +6,14 @@
 #include "cli/options.h"
 #include "gbtrace/train.h"
 
-/** A row per setting of the library, whose place is in `def`, and rows that tell what to use; returns how
- * many. */
+/** Fill `out` with a row per setting of the library, whose place is in `def`, and rows for options of other
+    programs. Returns the number of rows. */
 int train_options(gbt_train_def *def, option *out);
 
-/** The row of one setting, by its name, for another command, where its place is `value`. Not of a flag. */
+/** The row of one setting, by name, with its place at `value`, for use in another command. Not for flags. */
 option train_option(const char *name, void *value);
 
-/** After parsing: evaluation times ("1m,2m" or NULL), and the command line for the report. */
+/** After parsing: set evaluation times ("1m,2m" or NULL), and the command line, which the report shows. */
 gbt_status train_options_finish(gbt_train_def *def, const char *eval_at, const operands *given,
                                 gbt_error *err);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/ball_mesh.c -- balls as icospheres: the 12 corners and 30 edge middles of an icosahedron, 80
-   triangles. */
+/* command/ball_mesh.c -- balls as icospheres: an icosahedron subdivided once, with its 12 corners and 30 edge
+   midpoints as vertices and 80 triangles. */
 #include "command/ball_mesh.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@ static void set_unit(float out[3], double x, double y, double z)
     out[2] = (float)(z / length);
 }
 
-/** Index of the middle of edge ab, made on first use. */
+/** Index of the midpoint of edge ab; created on first use. */
 static uint32_t middle_of(icosphere *ico, uint32_t middle[CORNERS][CORNERS], uint32_t *count, uint32_t a,
                           uint32_t b)
 {
@@ -37,7 +37,7 @@ static uint32_t middle_of(icosphere *ico, uint32_t middle[CORNERS][CORNERS], uin
     return middle[a][b];
 }
 
-/** The corners are the cyclic permutations of (0, +-1, +-phi); three of them are a side if all three
+/** The corners are the cyclic permutations of (0, +-1, +-phi). Three of them form a face if all their
     distances are the edge length, 2. */
 static void make_icosphere(icosphere *ico)
 {
@@ -60,7 +60,7 @@ static void make_icosphere(icosphere *ico)
                     bc += (corner[b][k] - corner[c][k]) * (corner[b][k] - corner[c][k]);
                     ca += (corner[c][k] - corner[a][k]) * (corner[c][k] - corner[a][k]);
                 }
-                if (fmax(ab, fmax(bc, ca)) > 4.1) /* edges are 4 squared, the next distance is 10.5 */
+                if (fmax(ab, fmax(bc, ca)) > 4.1) /* squared: an edge is 4, the next larger distance 10.5 */
                     continue;
                 const double *p = corner[a], *q = corner[b], *r = corner[c];
                 const double volume = p[0] * (q[1] * r[2] - q[2] * r[1]) +

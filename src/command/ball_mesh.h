@@ -18,12 +18,12 @@ typedef struct ball_mesh {
 } ball_mesh;
 
 /**
- * One icosahedron split once, vertices on the sphere, per ball.
+ * One icosphere per ball: an icosahedron subdivided once, with all vertices on the sphere.
  *
  * @param center, color [in] [count][3]
  * @param radius        [in] [count]
  * @param out           [out] free with ball_mesh_free(); zeroed on failure
- * @return GBT_OK, GBT_ERR_NO_MEMORY (also when the vertices do not fit 32-bit indices)
+ * @return GBT_OK, GBT_ERR_NO_MEMORY (also when the vertices exceed 32-bit indices)
  */
 gbt_status ball_mesh_build(const float *center, const float *radius, const float *color, size_t count,
                            ball_mesh *out, gbt_error *err);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/compress.c -- a trained model to a small file, and what its bytes are. */
+/* command/compress.c -- compress a trained model into a small file, and report what its bytes are used for.
+ */
 #include "gbtrace/compress.h"
 
 #include <stdio.h>
@@ -24,17 +25,17 @@ gbt_compress_def gbt_compress_def_default(void)
     return (gbt_compress_def){.quality = 60, .cookie_ = DEF_COOKIE};
 }
 
-/* What is reported. */
+/* The figures of the report. */
 typedef struct compression {
     size_t anchors, before;
     model_sizes after;
     double probe_seconds, encode_seconds, decode_seconds;
     const char *steps_from;
     bool lossless;
-    bool kept; /* the file was small already: copied */
+    bool kept; /* the file was already small: it was copied */
 } compression;
 
-/* Whether RUN's own settings say that its model stays as it was trained. */
+/* Whether the settings of RUN ask for a lossless model. */
 static gbt_status find_wish(const char *run, bool *lossless, gbt_error *err)
 {
     char path[4096];
@@ -50,7 +51,7 @@ static gbt_status find_wish(const char *run, bool *lossless, gbt_error *err)
     return status;
 }
 
-/* The model file of RUN, or the file itself. */
+/* The model file: that of a run folder, or `run` itself if it is a file. */
 static gbt_status find_model(const char *run, char *path, size_t size, gbt_error *err)
 {
     if (file_is_folder(run))
@@ -125,13 +126,13 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     return status;
 }
 
-/* ---- a file that is small already ---- */
+/* ---- a file that is already small ---- */
 
 /**
- * When `path` is a coded model from which coding it again would gain nothing, `out` becomes a copy of it.
+ * If `path` is a coded model that would not get smaller, make `out` a copy of it.
  *
- * A coarse file does not say at which quality it was made; that is the default, unless somebody asked for
- * another. So it is coded again only below the default.
+ * A coarse file does not record its quality, which is the default unless the user chose another. So it is
+ * coded again only if the wanted quality is below the default.
  */
 static gbt_status keep_small(const char *path, const gbt_compress_def *def, const char *out, compression *c,
                              gbt_error *err)
@@ -139,7 +140,7 @@ static gbt_status keep_small(const char *path, const gbt_compress_def *def, cons
     unsigned char *bytes = NULL;
     container file = {0};
     model m = {0};
-    gbt_error unreadable = {0}; /* is said by who reads it next */
+    gbt_error unreadable = {0}; /* ignored here: whoever reads the file next reports it */
     if (file_read(path, &bytes, &c->before, &unreadable) != GBT_OK)
         return GBT_OK;
     gbt_status status = GBT_OK;
@@ -264,10 +265,10 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
         status = save_report(&c, def, err);
     loaded_run_close(r);
     mem_free(r);
-    return status == GBT_OK ? check_stop(err) : status; /* what follows shall not begin */
+    return status == GBT_OK ? check_stop(err) : status; /* after a stop request nothing more is started */
 }
 
-/* One process does it for all. */
+/* One process works for all. */
 gbt_status gbt_compress(const char *run, const gbt_compress_def *def, const char *out, FILE *report,
                         gbt_error *err)
 {

@@ -21,9 +21,10 @@
 #include "bvh/device.h"
 #include "gbtrace/version.h"
 
-static const double memory_warn = 2e9,
-                    memory_fail = 3e8; /* bytes: a run on 100 small photos, and less than starting needs */
-static const double disk_warn = 2e9, disk_fail = 1e8; /* bytes: some runs with checkpoints, and not one */
+/* Bytes. To warn: below a run on 100 small photos, or a few runs with checkpoints. To fail: too little to
+   start at all, or for one run. */
+static const double memory_warn = 2e9, memory_fail = 3e8;
+static const double disk_warn = 2e9, disk_fail = 1e8;
 
 static void advise(gbt_check *c, gbt_check_level level, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/doctor.h -- how the doctor's checks write their lines. */
+/* command/doctor.h -- lines of the report of gbtrace doctor, for the files that make the checks. */
 #ifndef GBT_COMMAND_DOCTOR_H
 #define GBT_COMMAND_DOCTOR_H
 
@@ -7,7 +7,7 @@
 
 #include "gbtrace/doctor.h"
 
-/** The next line, with level ok. The caller writes its texts. */
+/** The next line, with level ok; the caller fills in its texts. */
 static inline gbt_check *doctor_line(gbt_diagnosis *d, const char *name)
 {
     gbt_check *c = &d->checks[d->count < GBT_DOCTOR_MAX ? d->count++ : GBT_DOCTOR_MAX - 1];
@@ -15,13 +15,13 @@ static inline gbt_check *doctor_line(gbt_diagnosis *d, const char *name)
     return c;
 }
 
-/** A line about the self test: it fails beyond the limit, for NaN, and when more than half of the rays were
-   left out. `what`: what the error is of. */
+/** A line of the self-test. It fails if `error` exceeds `limit` or is NaN, or if more than half of the rays
+    were left out. `what`: the quantity compared. */
 void doctor_compare(gbt_diagnosis *d, const char *name, const char *what, double error, double limit,
                     size_t rays, size_t left_out);
 
-/** Tracer and adjoint against the double references on a procedural cloud; and how many rays go through a
-    larger one in a second. */
+/** Compare the tracer and its adjoint with the double-precision references on a procedural cloud, and measure
+    the rays per second through a larger one. */
 gbt_status doctor_self_test(gbt_diagnosis *d, gbt_error *err);
 
 #endif

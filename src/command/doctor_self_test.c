@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/doctor_self_test.c -- a small cloud traced, and its gradients, beside the double references; a
-   larger one against the clock. */
+/* command/doctor_self_test.c -- trace a small cloud and its gradients, compare them with the double-precision
+   references, and time the tracer on a larger cloud. */
 #include <math.h>
 #include <stdio.h>
 
@@ -24,8 +24,8 @@ enum {
     STREAM_GRADIENT = 2
 };
 
-/* A float picture differs by rounding of its sums alone, where no cut-off is near; the tests hold random
-   scenes to the same. */
+/* Away from cut-offs, a float image differs from the reference only by the rounding of its sums. The tests
+   apply the same limits to random scenes. */
 static const double picture_limit = 1e-4, gradient_limit = 5e-5;
 
 typedef struct patient {
@@ -38,7 +38,7 @@ typedef struct patient {
     double *wanted, *d_wanted, *d_exact; /* [rays][3], [fields][count], [rays][3] */
 } patient;
 
-/* Flat and round Gaussians in a ball of radius 1, the same on every machine. */
+/* Flat and round Gaussians in the unit ball, the same on every machine. */
 static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error *err)
 {
     GBT_TRY(gaussians_resize(g, count, err));
@@ -126,7 +126,7 @@ static gbt_status compare_pictures(patient *p, const reference_scene *exact, gbt
     for (size_t i = 0; i < 3 * rays; i++)
         if (!p->in_band[i / 3]) {
             const double error = fabs((double)p->rgb.pixels[i] - p->wanted[i]);
-            worst = error <= worst ? worst : error; /* NaN stays */
+            worst = error <= worst ? worst : error; /* the comparison keeps a NaN */
         }
     doctor_compare(d, "tracer", "largest error", worst, picture_limit, rays, left_out);
     return GBT_OK;
@@ -187,7 +187,7 @@ static gbt_status measure_speed(patient *p, gbt_diagnosis *d, gbt_error *err)
     const trace_outputs out = {.rgb = &p->rgb};
     double best = (double)INFINITY;
     GBT_TRY(set_up(p, LARGE, 0.03, LARGE_SIDE, LARGE_SIDE, err));
-    for (int i = 0; i <= PASSES; i++) { /* the first one warms up */
+    for (int i = 0; i <= PASSES; i++) { /* the first pass is a warm-up */
         const double start = clock_wall();
         GBT_TRY(trace_forward(&p->scene, &p->rays, false, &out, NULL, err));
         best = i > 0 ? fmin(best, clock_wall() - start) : best;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/evaluate.c -- score a run on its held-out views and write what is known of it: metrics.json, the
-   page, events. */
+/* command/evaluate.c -- score a run on its held-out views, and write metrics.json, the report page and
+   TensorBoard events. */
 #include "gbtrace/evaluate.h"
 
 #include <jansson.h>
@@ -28,7 +28,7 @@ gbt_evaluate_def gbt_evaluate_def_default(void)
                               .cookie_ = DEF_COOKIE};
 }
 
-/* dB that fitted colours must gain before a line says so: what is usual without exposures is below. */
+/* A gain by fitted colours above this, in dB, is reported: photos of constant exposure stay below it. */
 #define EXPOSURE_HINT 1.0
 
 static void log_scores(const evaluation *e)
@@ -53,8 +53,8 @@ static void log_scores(const evaluation *e)
 }
 
 /**
- * @param own [out] whether the scores are those of the run's own settings: its renderer, size and cut-offs,
- *                  and its data set, or one that stands for it when it has none or its own is gone
+ * @param own [out] whether the scores count as the run's own: with its renderer, size and cut-offs, and with
+ * its data set, or with any other if it has none or its own is gone
  */
 static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_run *r, bool *own,
                            gbt_error *err)
@@ -74,7 +74,7 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
         GBT_TRY(choice_check("renderer", GBT_RENDERER_TRAINING_NAMES, (int)def->renderer, err));
         r->frame.draw.renderer = def->renderer;
     }
-    const char *data = r->data.place; /* where its own is now; empty: nowhere */
+    const char *data = r->data.place; /* where its own data set is now; empty: gone */
     *own = r->frame.draw.renderer == trained && (def->downscale <= 0 || def->downscale == r->def.downscale) &&
            (def->preset == GBT_PRESET_AS_TRAINED || def->preset == GBT_PRESET_DEFAULT) &&
            (def->data == NULL || data[0] == '\0' || file_is_same(def->data, data));
@@ -84,7 +84,7 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
     return GBT_OK;
 }
 
-/* What belongs to the run. */
+/* Write the files that hold the run's own scores. */
 static gbt_status write_own(const char *run, const gbt_evaluate_def *def, loaded_run *r, const evaluation *e,
                             const json_t *metrics, gbt_error *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/expect.c -- memory and time of a training run from the sizes of its data. */
+/* command/expect.c -- predict memory and time of a training run from the sizes of its data. */
 #include "command/expect.h"
 
 #include <math.h>
@@ -8,17 +8,18 @@
 #include "train/photos.h"
 #include "train/step_pixels.h"
 
-/* Core-seconds of a step with AVX2, the mean over a run of usual_core_seconds: for the anchors in view, and
-   by its pixels. The longer a run the more anchors it has: its steps take (core-seconds / usual)^growth times
-   as long. Chosen on runs of 42, 84 and 120 s of plush, fox, castle, aerial and the demo, and of 4 minutes of
-   photos of megapixels, with AVX-512 on two cores of a server CPU, which they meet within 15 %. */
+/* Core-seconds of a step with AVX2, averaged over a run of usual_core_seconds: a part for the anchors in
+   view, and a part per pixel. Longer runs have more anchors, so their steps take (core-seconds /
+   usual)^growth times as long. Fitted to runs of 42, 84 and 120 s on plush, fox, castle, aerial and the demo,
+   and of 4 minutes on photos of megapixels, with AVX-512 on two cores of a server CPU; the prediction is
+   within 15 % of each. */
 static const double anchors_core_seconds = 0.053, core_seconds_per_megapixel = 0.2, growth = 0.15,
                     usual_core_seconds = 280;
-/* Of a held-out view, with its pictures. */
+/* The same for scoring a held-out view and writing its pictures. */
 static const double score_core_seconds = 0.13, score_core_seconds_per_megapixel = 1.05;
 
-/* How many times as long the same takes. AVX-512 from runs of 42 s on two such machines; NEON and plain C
-   from instructions counted, and the tracer's time (docs/performance.md). */
+/* Run time relative to AVX2. AVX-512: from runs of 42 s on two such machines. NEON and plain C: from
+   instruction counts and the tracer's time (docs/performance.md). */
 static const double slower_than_avx2[CPU_ISA_COUNT] = {
     [CPU_PLAIN] = 8, [CPU_NEON] = 1.7, [CPU_AVX2] = 1, [CPU_AVX512] = 0.6};
 
@@ -56,7 +57,7 @@ json_t *expect_to_json(const expectation *e)
                      e->score_seconds, "threads", e->threads);
 }
 
-/* Two digits are more than is known. */
+/* To two digits, which is already more than the accuracy. */
 static double rounded(double value)
 {
     const double unit = value > 0 ? pow(10, floor(log10(value)) - 1) : 1;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/expect.h -- what training on a data set will ask of the machine: memory and time, from constants
-   that were measured. */
+/* command/expect.h -- predict memory and time of a training run, from constants that were measured. */
 #ifndef GBT_COMMAND_EXPECT_H
 #define GBT_COMMAND_EXPECT_H
 
@@ -13,20 +12,20 @@
 
 typedef struct expectation {
     memory_need memory;
-    double step_seconds;  /* one iteration, the mean over the run */
-    double score_seconds; /* the held-out views: rendered, compared, written */
-    int threads;          /* that the times are for */
+    double step_seconds;  /* one iteration, mean over the run */
+    double score_seconds; /* to render, compare and write the held-out views */
+    int threads;          /* for which the times hold */
 } expectation;
 
 /**
- * Of a run with the default settings, photos divided by `downscale`, above 0, and a budget of `budget`
- * seconds, above 0. Good within a quarter on scenes and processors like those it was measured on.
+ * Predict a run with default settings, photos divided by `downscale` > 0, and a budget of `budget` > 0
+ * seconds. Within 25 % on scenes and processors like those that were measured.
  */
 expectation expect_training(const scene *s, double downscale, int threads, cpu_isa isa, double budget);
 
 json_t *expect_to_json(const expectation *e);
 
-/** One line for a person. */
+/** Print the prediction for a person. */
 void expect_print(const expectation *e, FILE *out);
 
 #endif

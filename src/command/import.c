@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/import.c -- a trained Scaffold-GS model as a run. */
+/* command/import.c -- import a trained Scaffold-GS model as a run. */
 #include "gbtrace/import.h"
 
 #include <math.h>
@@ -48,7 +48,8 @@ static gbt_status find_input(const char *input, result_folder *out, gbt_error *e
                : base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", input);
 }
 
-/* A width in cfg_args, or images_N of open size, divides photos by what only they can say. */
+/* By how much training reduced the photos. If cfg_args gives a width, or photos came from a folder images_N
+   of unknown N, only the photos themselves can tell. */
 static gbt_status find_downscale(const result_folder *from, const char *data, double *out, gbt_error *err)
 {
     scene s;
@@ -68,7 +69,7 @@ static gbt_status find_downscale(const result_folder *from, const char *data, do
     return status;
 }
 
-/* What is about the scene and the run. */
+/* Fill in the model's settings and scene data. */
 static gbt_status describe(model *m, const result_folder *from, const gbt_import_def *def, gbt_error *err)
 {
     char full[RESULT_PATH_SIZE];
@@ -92,7 +93,7 @@ static gbt_status describe(model *m, const result_folder *from, const gbt_import
     return GBT_OK;
 }
 
-/* Before any work. */
+/* Check the output files before any work is done. */
 static gbt_status check_places(const char *run, const gbt_import_def *def, gbt_error *err)
 {
     static const char *const names[] = {"config", "model.gbt"};

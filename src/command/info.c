@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/info.c -- what a data set or a model holds, for a person or as JSON. */
+/* command/info.c -- describe the contents of a data set or a model, for a person or as JSON. */
 #include "gbtrace/info.h"
 
 #include <math.h>
@@ -26,8 +26,8 @@
 /* ---- data sets ---- */
 
 /**
- * The box that leaves out 5 % of the points on each side of each axis, world coordinates: a few outliers must
- * not be the size of a scene.
+ * The box without the outermost 5 % of the points on each side of each axis, in world coordinates: outliers
+ * should not determine the size of a scene.
  */
 static gbt_status find_box(const float *position, size_t count, const double origin[3], double low[3],
                            double high[3], gbt_error *err)
@@ -54,7 +54,7 @@ typedef struct dataset_facts {
     expectation expect;
 } dataset_facts;
 
-/* Which views are held out when nobody says otherwise. */
+/* The split that is used by default. */
 static const char *split_name(const scene *s) { return s->has_split ? "own" : "every=8"; }
 
 static json_t *dataset_to_json(const char *path, const dataset_facts *f)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/init_quality.c -- how well so many centres stand for a cloud: the paper's balls, adaptive ones and
-   voxels side by side. */
+/* command/init_quality.c -- compare how well centres represent a cloud: the paper's balls, adaptive balls,
+   and voxels. */
 #include "command/init_quality.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "base/memory.h"
 #include "bvh/points.h"
 
-/* Of each point: its centre in nearest[i], its squared distance added up. */
+/* For each point find the nearest centre, and sum the squared distances. */
 static gbt_status find_nearest(const scene_points *points, const float *center, size_t count,
                                uint32_t *nearest, double *squares, gbt_error *err)
 {
@@ -26,13 +26,13 @@ static gbt_status find_nearest(const scene_points *points, const float *center, 
     return status;
 }
 
-/* Squares of the differences to the mean colour of the points that share a centre, added up over points and
-   channels. */
+/* Sum over points and channels of the squared differences to the mean colour of the points that share a
+   centre. */
 static double color_squares(const scene_points *points, const uint32_t *nearest, double *mean,
                             size_t *members)
 {
     double squares = 0;
-    for (size_t i = 0; i < points->count; i++) { /* Welford's update: no second pass, no lost digits */
+    for (size_t i = 0; i < points->count; i++) { /* Welford's update: one pass without cancellation */
         const double n = (double)++members[nearest[i]];
         for (size_t k = 0; k < 3; k++) {
             double *m = &mean[3 * (size_t)nearest[i] + k];
@@ -66,14 +66,14 @@ static gbt_status measure(const scene_points *points, const float *center, size_
     return status;
 }
 
-/* The finest voxels that are no more than `most`: by bisection of the logarithm of their edge. */
+/* The finest voxel grid of at most `most` voxels: bisection of the logarithm of the edge length. */
 static gbt_status finest_voxels(const scene_points *points, float voxel_size, size_t most, float **center,
                                 size_t *count, gbt_error *err)
 {
     float low = voxel_size, high = voxel_size;
     GBT_TRY(voxel_centers(points->position, points->count, high, center, count, err));
-    while (*count > most && high < 1e30f) { /* even one voxel may be more when points lie on both sides of all
-                                               edges: eight then */
+    while (*count > most && high < 1e30f) { /* may not end: points on both sides of all three planes through
+                                               the origin fill eight voxels at any edge length */
         mem_free(*center);
         low = high;
         high *= 2;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* command/init_report.c -- anchors of a cloud as a PLY that people can look at, and their number beside the
-   voxel baseline's.
+/* command/init_report.c -- gbtrace init: the initial anchors as a PLY for viewers, and their number compared
+   with the voxel baseline.
 
    scene --> voxel size --> anchors (+ balls)
-        --> [one row per anchor: radius, scales, count, depth, colour] --> PLY, lines, JSON */
+        --> [one row per anchor: radius, scales, count, depth, colour] --> PLY, text, JSON */
 #include "gbtrace/init.h"
 
 #include <math.h>
@@ -40,12 +40,12 @@ gbt_init_def gbt_init_def_default(void)
                           .cookie_ = DEF_COOKIE};
 }
 
-/* ---- a row per anchor ---- */
+/* ---- one row per anchor ---- */
 
 typedef struct anchor_rows {
     float *radius, *count, *depth; /* [anchors] */
     float *color;                  /* [anchors][3] */
-    float *scale;                  /* [anchors][6], std-devs */
+    float *scale;                  /* [anchors][6], standard deviations */
 } anchor_rows;
 
 static void rows_free(anchor_rows *r)
@@ -80,7 +80,7 @@ static void rows_from_balls(anchor_rows *r, const balls *b, bool has_color)
         r->color[i] = has_color ? b->color[i] : 0.5f;
 }
 
-/** Voxels keep no members: a point belongs to the nearest centre. */
+/** Rows of voxel anchors, which keep no list of members: each point is assigned to the nearest centre. */
 static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scene_points *points,
                                     gbt_error *err)
 {
@@ -92,7 +92,7 @@ static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scen
     for (size_t i = 0; i < points->count && status == GBT_OK; i++) {
         const size_t j = nearest[i];
         r->count[j] += 1.0f;
-        for (size_t k = 0; k < 3; k++) /* a running mean, so that a crowded cell loses no digits */
+        for (size_t k = 0; k < 3; k++) /* a running mean, which keeps its precision in crowded cells */
             r->color[3 * j + k] += (points->color[3 * i + k] - r->color[3 * j + k]) / r->count[j];
     }
     mem_free(nearest);
@@ -102,7 +102,7 @@ static gbt_status rows_from_nearest(anchor_rows *r, const anchors *a, const scen
     return GBT_OK;
 }
 
-/* ---- out ---- */
+/* ---- output ---- */
 
 static gbt_status write_points(const char *path, const scene *s, const anchors *a, const anchor_rows *r,
                                gbt_error *err)
@@ -149,7 +149,7 @@ typedef struct spread {
     double min, median, mean, max;
 } spread;
 
-/** `values` with a stride; scratch is [count]. */
+/** Spread of `values` with a stride; scratch is [count]. */
 static spread spread_of(const float *values, size_t stride, size_t count, float *scratch)
 {
     spread s = {0};
@@ -193,7 +193,7 @@ static json_t *qualities_to_json(const init_quality *rows)
     return list;
 }
 
-/* Where the voxel size is from. */
+/* Where the voxel size comes from. */
 static const char *size_from(const init_facts *f, char *out)
 {
     return f->voxel_size_given ? "given" : choice_name(GBT_VOXEL_RULE_NAMES, (int)f->voxel_rule, out);
@@ -248,7 +248,7 @@ static void print_facts(FILE *out, const init_facts *f)
         fprintf(out, "  %-18s %10zu %10.4g %10.4g\n", q->name, q->anchors, q->distance, q->color);
 }
 
-/* How many voxels the baseline starts from: its cells are the world's. */
+/* The number of voxels from which the baseline starts; its grid is aligned with world coordinates. */
 static gbt_status count_voxels(const scene *s, float voxel_size, size_t *out, gbt_error *err)
 {
     const size_t values = 3 * s->points.count;
@@ -263,15 +263,15 @@ static gbt_status count_voxels(const scene *s, float voxel_size, size_t *out, gb
     return status;
 }
 
-/* What is made of the anchors. */
+/* The outputs that were asked for. */
 typedef struct init_outputs {
     const char *ply;
-    bool mesh;        /* of the PLY: triangles, not points */
+    bool mesh;        /* the PLY holds triangles, not points */
     const char *json; /* NULL: none */
     FILE *report;
 } init_outputs;
 
-/** Everything after the anchors are made. */
+/** Everything after the anchors have been made. */
 static gbt_status report_anchors(const char *data, const scene *s, const anchors *a, const balls *b,
                                  init_facts *facts, const init_outputs *out, gbt_error *err)
 {
@@ -314,7 +314,7 @@ static gbt_status check_def(const gbt_init_def *def, gbt_error *err)
 {
     GBT_TRY(def_check(def->cookie_, "gbt_init_def_default", err));
     GBT_TRY(choice_check("voxel_rule", GBT_VOXEL_RULE_NAMES, (int)def->voxel_rule, err));
-    gbt_train_def train = gbt_train_def_default(); /* which has the same ranges */
+    gbt_train_def train = gbt_train_def_default(); /* for its range checks: training has the same settings */
     train.init = def->init;
     train.init_count = def->init_count;
     train.scale_prior = def->scale_prior;

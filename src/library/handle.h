@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* library/handle.h -- what is behind a gbt_model. */
+/* library/handle.h -- the struct behind the public handle gbt_model. */
 #ifndef GBT_LIBRARY_HANDLE_H
 #define GBT_LIBRARY_HANDLE_H
 
@@ -10,16 +10,18 @@
 
 struct gbt_model {
     loaded_run run;
-    trace_settings settings; /* the caller's; those of `run` stay as it was opened */
-    char path[4096];         /* that it was opened from; empty: of arrays */
-    float *quat_length;      /* [run.cloud.count] of the quaternions that the caller gave; NULL: all 1 */
-    unsigned char *raised;   /* [run.cloud.count] bit k: the given scale_log[k] is below what is drawn */
-    bool kept;               /* the last render can be differentiated */
-    gaussian_cloud gradient; /* room for that of run.cloud; its mean is not used */
+    trace_settings settings; /* as the caller changed them; those of `run` stay as opened */
+    char path[4096];         /* file it was opened from; empty: made from arrays */
+    float *quat_length; /* [run.cloud.count] lengths of the caller's quaternions before normalization; NULL:
+                           all 1 */
+    unsigned char *raised;   /* [run.cloud.count] bit k: the caller's scale_log[k] was too small and has been
+                                raised */
+    bool kept;               /* the last render was kept, so that it can be differentiated */
+    gaussian_cloud gradient; /* scratch for the gradient of run.cloud; its mean is not used */
     float *d_mean;           /* [run.cloud.count][3] */
 };
 
-/* For the caller's arrays: NULL is not wanted. */
+/* For optional outputs: NULL is skipped. */
 static inline void copy_floats(const float *from, size_t count, float *to)
 {
     if (to != NULL)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* library/open.c -- models from files and arrays, and what can be asked of them. */
+/* library/open.c -- open models from files and arrays, and answer questions about them. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +16,7 @@ static gbt_status make(gbt_model **out, gbt_error *err)
     return *out != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* The result of opening `m`, which is closed when that failed. */
+/* Return `m` in *out if opening it succeeded; otherwise close it. */
 static gbt_status opened(gbt_model *m, gbt_status status, gbt_model **out)
 {
     m->run.frame.draw.renderer = GBT_RENDERER_TRACE;
@@ -33,7 +33,7 @@ gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err)
     gbt_model *m;
     *out = NULL;
     GBT_TRY(make(&m, err));
-    snprintf(m->path, sizeof m->path, "%s", path); /* a longer one cannot be opened */
+    snprintf(m->path, sizeof m->path, "%s", path); /* longer paths cannot be opened */
     return opened(m, loaded_run_open_model(path, &m->run, err), out);
 }
 
@@ -49,7 +49,7 @@ void gbt_model_close(gbt_model *m)
     mem_free(m);
 }
 
-/* ---- Gaussians of the caller ---- */
+/* ---- the caller's Gaussians ---- */
 
 static const float below_one = 1 - FLT_EPSILON;
 
@@ -86,7 +86,8 @@ static gbt_status check(const gbt_gaussians *g, gbt_error *err)
     return GBT_OK;
 }
 
-/* Copies, in the form that files are read into; and what that changed. */
+/* Copy the caller's Gaussians into the form in which files are read. Records what that changed: the length of
+   each quaternion, and which scales were raised. */
 static gbt_status copy(const gbt_gaussians *g, gaussian_cloud *cloud, float *quat_length,
                        unsigned char *raised, gbt_error *err)
 {
@@ -174,7 +175,7 @@ gbt_status gbt_model_get_gaussians(const gbt_model *m, float *mean, float *scale
     return GBT_OK;
 }
 
-/* ---- questions ---- */
+/* ---- queries ---- */
 
 gbt_model_info gbt_model_get_info(const gbt_model *m)
 {

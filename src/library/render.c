@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* library/render.c -- pictures into the caller's arrays, and gradients out of them. */
+/* library/render.c -- render pictures into the caller's arrays, and compute gradients of them. */
 #include <math.h>
 #include <string.h>
 
@@ -22,7 +22,7 @@ gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, bool keep, c
     for (int k = 0; k < 3; k++)
         local.center[k] -= r->model.origin[k];
     GBT_TRY(frame_prepare(f, loaded_run_subject(r), &local, &m->settings, err));
-    /* the caller's own, written in place */
+    /* wraps the caller's array, so that the tracer writes into it */
     image rgb = {.width = camera->width, .height = camera->height, .channels = 3, .pixels = out->rgb};
     const trace_outputs outputs = {.rgb = &rgb, .depth = out->depth, .transmittance = out->transmittance};
     GBT_TRY(trace_forward(&f->scene, &f->rays, keep != 0, &outputs, NULL, err));
@@ -30,7 +30,7 @@ gbt_status gbt_model_render(gbt_model *m, const gbt_camera *camera, bool keep, c
     return GBT_OK;
 }
 
-/* Room for the gradients of the cloud. */
+/* Allocate the gradients of the cloud. */
 static gbt_status reserve_gradient(gbt_model *m, gbt_error *err)
 {
     const size_t count = m->run.cloud.count;
@@ -42,7 +42,8 @@ static gbt_status reserve_gradient(gbt_model *m, gbt_error *err)
     return m->d_mean == NULL ? GBT_ERR_NO_MEMORY : gaussian_cloud_alloc(&m->gradient, count, err);
 }
 
-/* A scale that was raised (gaussian_limit_scales()) is a part of the largest one. */
+/* A raised scale (gaussian_limit_scales()) is a fixed fraction of the largest one, so its gradient goes
+   there. */
 static void give_to_largest(const float scale_log[3], unsigned raised, float gradient[3])
 {
     const int largest = scale_log[0] >= scale_log[1] && scale_log[0] >= scale_log[2] ? 0
@@ -55,7 +56,7 @@ static void give_to_largest(const float scale_log[3], unsigned raised, float gra
         }
 }
 
-/* f->d_gaussians to the arrays of the caller. */
+/* Convert f->d_gaussians into the caller's arrays. */
 static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out, gbt_error *err)
 {
     const gaussian_cloud *cloud = &m->run.cloud;
@@ -98,9 +99,10 @@ gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6]
             return base_fail(err, GBT_ERR_ARGUMENT, "gradient: value %zu of d_rgb is %g (wanted finite)", i,
                              (double)d_rgb[i]);
     m->kept = false;
-    const image d_image = {
-        .width = f->rays.width, .height = f->rays.height, .channels = 3, .pixels = (float *)d_rgb}; /* only
-                                                                                                       read */
+    const image d_image = {.width = f->rays.width,
+                           .height = f->rays.height,
+                           .channels = 3,
+                           .pixels = (float *)d_rgb}; /* the pixels are only read */
     GBT_TRY(frame_backward_gaussians(f, &d_image, err));
     if (d_pose != NULL)
         GBT_TRY(frame_backward_pose(f, loaded_run_subject(&m->run), d_pose, err));

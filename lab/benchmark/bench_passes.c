@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_passes.c -- time passes over the same Gaussians and rays, traced or splatted in several
-   ways in turn. */
+/* benchmark/bench_passes.c -- time several ways to render the same Gaussians and rays, traced or splatted,
+   taking turns. */
 #include "benchmark/bench_passes.h"
 
 #include <stdlib.h>
@@ -91,7 +91,8 @@ static gbt_status backward(passes *p, bench_way *w, gbt_error *err)
                             : trace_backward(&w->traced, p->rays, &p->d_rgb, &p->d_gaussians, NULL, err);
 }
 
-/* Build, forward, adjoint; `sample` counts from 0, and -1 is not kept. */
+/* Time one pass: build, forward, adjoint. `sample` counts from 0; -1 is the warm-up, whose times are dropped.
+ */
 static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
 {
     cpu_limit_isa(w->isa);
@@ -103,7 +104,7 @@ static gbt_status pass(passes *p, bench_way *w, int sample, gbt_error *err)
     const double t2 = clock_wall(), c2 = clock_process();
     GBT_TRY(backward(p, w, err));
     const double t3 = clock_wall(), c3 = clock_process();
-    if (sample < 0) { /* the first build: what Embree holds for it is new */
+    if (sample < 0) { /* the first build: all memory that Embree has allocated since then is for this tree */
         w->figures.tree_bytes =
             w->kernel == TRACE_EMBREE ? bvh_memory_bytes() - embree_bytes : w->traced.tree.bytes;
         w->figures.list_bytes = w->traced.listed ? list_builder_bytes(&w->traced.lists) : 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_reference.c -- some pixels of a picture in double, and how far another picture is from
-   them. */
+/* benchmark/bench_reference.c -- render some pixels in double precision, and measure the error of other
+   pictures against them. */
 #include "benchmark/bench_reference.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 
 enum { CHECK_STRIDE = 8 };
 
-/* Pixel of the whole picture that ray `i` of the few is of. */
+/* The pixel of the whole picture to which ray `i` of the subset belongs. */
 static size_t pixel_of(const ray_image *few, int width, size_t i)
 {
     return i / (size_t)few->width * CHECK_STRIDE * (size_t)width + i % (size_t)few->width * CHECK_STRIDE;
@@ -22,7 +22,7 @@ static size_t pixel_of(const ray_image *few, int width, size_t i)
 trace_settings bench_settings_without_cuts(const trace_settings *settings)
 {
     trace_settings s = *settings;
-    s.alpha_min = 1e-12f; /* a million of these change a colour by 1e-6 */
+    s.alpha_min = 1e-12f; /* a million responses below this change a colour by 1e-6 */
     s.transmittance_min = 0;
     return s;
 }
@@ -75,7 +75,7 @@ void bench_reference_free(bench_reference *reference)
 
 static void add_error(bench_error *sum, double error)
 {
-    sum->psnr += error * error; /* a sum of squares, until bench_error_of() */
+    sum->psnr += error * error; /* holds the sum of squares until bench_error_of() */
     sum->max = larger_or_nan(sum->max, fabs(error));
 }
 

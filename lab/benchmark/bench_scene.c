@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_scene.c -- what benchmarks and studies trace: plain Gaussians or those of a run, and the
-   rays of one camera. */
+/* benchmark/bench_scene.c -- the input of benchmarks and studies: Gaussians, plain or decoded from a run, and
+   the rays of one camera. */
 #include "benchmark/bench_scene.h"
 
 #include <string.h>
@@ -34,10 +34,10 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
     }
     out->settings = run->settings;
     run->frame.draw.renderer =
-        GBT_RENDERER_TRACE; /* of a run trained with splats too: who measures chooses */
+        GBT_RENDERER_TRACE; /* also for a run trained with splats: the caller chooses the renderer */
     out->is_plain = is_plain;
     if (is_plain)
-        run->frame.draw.footprint = 0; /* the Gaussians as the file has them */
+        run->frame.draw.footprint = 0; /* the Gaussians exactly as in the file */
     return GBT_OK;
 }
 
@@ -50,7 +50,8 @@ static gbt_status trace_rays(void *context, trace_scene *built, const ray_image 
 
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
-    const frame_tracer whole = {.trace = trace_rays}; /* with one, nothing is left out */
+    const frame_tracer whole = {.trace = trace_rays}; /* with a tracer given, all Gaussians in view are kept
+                                                       */
     GBT_TRY(frame_render_with(&s->run.frame, loaded_run_subject(&s->run), &s->camera.shot, &s->settings,
                               s->is_plain ? &whole : NULL, err));
     s->gaussians = frame_drawn(&s->run.frame);

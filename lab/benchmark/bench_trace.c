@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/bench_trace.c -- time build, forward and adjoint on given Gaussians, with the error against the
-   double reference beside it. */
+/* benchmark/bench_trace.c -- gbtrace bench trace: time build, forward and adjoint of one or more kernels on
+   the same Gaussians, and print their errors against the double-precision reference. */
 #include <jansson.h>
 #include <math.h>
 #include <string.h>
@@ -20,10 +20,10 @@ lab_bench_def lab_bench_def_default(void)
     return (lab_bench_def){.repeats = 5, .preset = GBT_PRESET_AS_TRAINED, .kernel = "list"};
 }
 
-/* What the caller has given in place of the model's own. */
+/* Replace one of the model's settings by the caller's value, if there is one. */
 static gbt_status override_setting(const char *name, float given, float *setting, gbt_error *err)
 {
-    static const float least = 1e-30f; /* below it kernels round to 0 what counts */
+    static const float least = 1e-30f; /* below it, kernels would round responses that count to 0 */
     if (isnan(given) || given == 0)
         return GBT_OK;
     if (!(given >= least && given < 1))
@@ -45,7 +45,7 @@ static gbt_status override_settings(const lab_bench_def *def, trace_settings *se
     return override_setting("t_min", def->t_min, &settings->transmittance_min, err);
 }
 
-/* ---- figures: one table for the text and for the file ---- */
+/* ---- figures: one table for the text and the JSON file ---- */
 
 typedef struct measured {
     const lab_bench_def *def;
@@ -53,18 +53,18 @@ typedef struct measured {
     int kernel[KERNELS_MAX];
     bench_way ways[KERNELS_MAX];
     bench_splat splat;
-    bench_error error[KERNELS_MAX];  /* when checked: to the reference with the same cut-offs, */
-    bench_error steady[KERNELS_MAX]; /* on the rays outside of the rounding band, */
-    bench_error whole[KERNELS_MAX];  /* and to the one without, on all */
+    bench_error error[KERNELS_MAX];  /* if checked: against the reference with the same cut-offs, */
+    bench_error steady[KERNELS_MAX]; /* the same on rays outside of the rounding band, */
+    bench_error whole[KERNELS_MAX];  /* and against the reference without cut-offs, on all rays */
     size_t count, check_rays, steady_rays;
 } measured;
 
 enum { ROW_COUNT = 25 };
 typedef struct figure_row {
-    const char *label, *key; /* what people read; the name in the file */
+    const char *label, *key; /* label in the text; key in the file */
     double value;
     int decimals;
-    bool is_cost; /* worth a ratio */
+    bool is_cost; /* a cost: its ratio to the first kernel is printed */
 } figure_row;
 
 static void list_figures(const measured *m, size_t way, figure_row rows[ROW_COUNT])
@@ -114,7 +114,7 @@ static void print_head(const measured *m, FILE *out)
             (double)s->settings.alpha_max, (double)s->settings.transmittance_min, m->def->repeats);
 }
 
-/* One column per kernel; of the others, how often the first's is in it. */
+/* One column per kernel. From the second on, costs are followed by the speed-up over the first kernel. */
 static void print_figures(const measured *m, FILE *out)
 {
     figure_row rows[KERNELS_MAX][ROW_COUNT];
@@ -170,7 +170,7 @@ static json_t *way_to_json(const measured *m, size_t way)
     return out;
 }
 
-/* The first kernel's figures stand at the top, where programs have always found them. */
+/* The first kernel's figures stand at the top level of the JSON, as in earlier versions. */
 static gbt_status save_figures(const measured *m, gbt_error *err)
 {
     const trace_settings *s = &m->scene->settings;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad.c -- gradients on the user's own scene: renderers and decode against the same in
-   double, the whole chain against differences. docs/gradients.md.
+/* benchmark/check_grad.c -- gbtrace check-grad: check gradients on the user's own scene. Renderers and
+   decoder are compared with double-precision versions, the whole chain with finite differences.
+   docs/gradients.md.
 
    tracer      float adjoint of the image gradient      | reference_scene_backward() on the same Gaussians
    rasterizer  the same                                 | raster_reference_backward()
@@ -9,8 +10,8 @@
    chain       float gradient of the training loss g    | d . g against central differences of the loss,
                                                         | all of it in double; by the tracer
 
-   For normally distributed directions d, E[(d . (g - g'))^2] = |g - g'|^2: a few directions estimate the
-   relative L2 error of a class of parameters, whatever its size. */
+   For normally distributed directions d, E[(d . (g - g'))^2] = |g - g'|^2. So a few directions estimate the
+   relative L2 error of a class of parameters, however many parameters it has. */
 #include "benchmark/check_grad.h"
 
 #include "base/fail.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad_chain.c -- the decoder's adjoint against the same in double, and the gradient of the
-   training loss against differences. */
+/* benchmark/check_grad_chain.c -- compare the decoder's adjoint with its double-precision version, and the
+   gradient of the training loss with finite differences. */
 #include <string.h>
 
 #include "base/fail.h"
@@ -12,17 +12,19 @@
 
 enum { ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };
 
-/* What float32 leaves (check_grad_renderers.c). The chain's limit is wider: its two sides do not decode the
-   same bits, so a hit in ten thousand falls on the other side of a cut. */
+/* Errors that float32 explains (see check_grad_renderers.c). The limit of the chain is wider, because its two
+   sides decode values with different rounding, so that one hit in ten thousand falls on the other side of a
+   cut-off. */
 static const double decode_limit = 1e-5, chain_limit = 1e-3;
 
 static const double step =
-    1e-8; /* of a difference, in standard deviations of the direction: few cuts are crossed */
-static const double smooth_limit =
-    1e-4; /* the differences to both sides agree to this part of the gradient, or a cut was crossed */
-static const double gradient_floor = 1e-6; /* below it a difference of double losses is rounding */
+    1e-8; /* step of the differences, in standard deviations of the direction: small, to cross few cut-offs */
+static const double smooth_limit = 1e-4; /* largest relative disagreement of the two one-sided differences;
+                                            beyond it a cut-off was crossed */
+static const double gradient_floor =
+    1e-6; /* smaller gradients vanish in the rounding of a difference of double losses */
 
-/* A class of parameters in the three forms in which it appears here. */
+/* A class of parameters, in the three representations in which it is needed here. */
 typedef struct parameter_class {
     char name[24];
     double *value;        /* in c->parameters */
@@ -57,12 +59,13 @@ static void list_classes(grad_checker *c, parameter_class out[CLASS_COUNT])
     }
 }
 
-/* The adjoint of the whole image; then the same gradients of the Gaussians through the decoder in
-   double. */
+/* The float adjoint of the whole image, and the same gradients of the Gaussians propagated through the
+   double-precision decoder. */
 gbt_status grad_check_decode(grad_checker *c, gbt_error *err)
 {
     frame *f = c->frame;
-    GBT_TRY(grad_render_at(c, c->view, c->width, err)); /* a kept pass has one adjoint */
+    GBT_TRY(grad_render_at(c, c->view, c->width, err)); /* again, since a recorded pass has only one adjoint
+                                                         */
     GBT_TRY(frame_backward_gaussians(f, &c->d_image, err));
     loss_add_gradient(&f->gaussians, grad_volume_weight(c), &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_anchors,
@@ -85,8 +88,8 @@ gbt_status grad_check_decode(grad_checker *c, gbt_error *err)
     return GBT_OK;
 }
 
-/* The loss of the picture with SSIM from its definition (image/metrics.h), in double: the terms of its
-   mean. */
+/* The loss of the picture in double, with SSIM by its definition (image/metrics.h): the terms whose mean it
+   is. */
 static void loss_terms(const grad_checker *c, double *terms)
 {
     enum { RADIUS = 5, TAPS = 2 * RADIUS + 1 };
@@ -135,8 +138,8 @@ static void decode_block(size_t block, size_t begin, size_t end, void *context)
                        c->slots + begin * (size_t)c->parameters.offset_count * DECODE_REF_FIELDS);
 }
 
-/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended are not
-   traced: they are not in the image. */
+/* The training loss of c->parameters, in double from end to end. Gaussians that no ray blended do not affect
+   the image and are not traced. */
 static gbt_status chain_loss(grad_checker *c, reference_scene *seen, int which, gbt_error *err)
 {
     const frame *f = c->frame;
@@ -160,8 +163,8 @@ static gbt_status chain_loss(grad_checker *c, reference_scene *seen, int which, 
     return GBT_OK;
 }
 
-/* Differences of the loss along `direction` to both sides, per length. Summed pixel by pixel, so that no
-   large sums are subtracted. */
+/* One-sided differences of the loss in both senses of `direction`, per unit length. They are formed pixel by
+   pixel before summing, to avoid the cancellation of large sums. */
 static gbt_status differences_along(grad_checker *c, const parameter_class *class, const double *direction,
                                     double *keep, reference_scene *seen, double out[2], gbt_error *err)
 {
@@ -184,7 +187,8 @@ static gbt_status differences_along(grad_checker *c, const parameter_class *clas
     return status;
 }
 
-/* `scratch` holds two arrays of the class's size. `error` is NaN when too few directions crossed no cut. */
+/* Check one class of parameters. `scratch` holds two arrays of its size. `error` is NaN if too few directions
+   crossed no cut-off. */
 static gbt_status check_class(grad_checker *c, const parameter_class *class, uint64_t stream, double *scratch,
                               reference_scene *seen, size_t *crossed, double *error, gbt_error *err)
 {

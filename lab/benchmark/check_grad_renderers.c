@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad_renderers.c -- the adjoints of the renderers against the same in double. */
+/* benchmark/check_grad_renderers.c -- compare the adjoints of the renderers with double-precision versions.
+ */
 #include <string.h>
 
 #include "base/fail.h"
@@ -11,11 +12,13 @@
 
 enum { RAY_GRAIN = 16 };
 
-/* What float32 leaves. A trained scene has Gaussians that are 1e-5 of their distance thin, where the rounding
-   of coordinates alone is 1e-2 of a std-dev: five times that of the tests' random scenes. */
+/* Errors that float32 explains. Trained scenes have Gaussians whose thickness is 1e-5 of their distance,
+   where the rounding of coordinates alone is 1e-2 of a standard deviation; the limit is five times that of
+   the random scenes in the tests. */
 static const double renderer_limit = 5e-5;
-static const double colour_limit = 1e-5; /* between splats in float and in double that blend the same */
-/* Rays that may be left out. Of splats rounding makes few pixels differ: more are drawn wrong. */
+static const double colour_limit = 1e-5; /* between float and double splats that blend the same Gaussians */
+/* Largest share of rays that may be left out. For splats, rounding changes few pixels; if more differ, they
+   are drawn wrong. */
 static const double left_out_limit = 0.9, left_out_limit_of_splats = 0.01;
 
 typedef struct band_job {
@@ -36,7 +39,7 @@ static void band_block(size_t block, size_t begin, size_t end, void *context)
     band_scratch_free(&scratch);
 }
 
-/* Rays where rounding may change which Gaussians are blended, or their order. */
+/* Find the rays on which rounding may change which Gaussians are blended, or in which order. */
 static gbt_status find_band(grad_checker *c, bool *in_band, gbt_error *err)
 {
     const size_t blocks = parallel_block_count(c->ray_count, RAY_GRAIN);
@@ -52,7 +55,8 @@ static gbt_status find_band(grad_checker *c, bool *in_band, gbt_error *err)
     return status;
 }
 
-/* The same for splats, whose definition in double shows no hits: pixels on which it draws another colour. */
+/* The same for splats. Their double-precision version does not report hits, so take the pixels whose colours
+   differ. */
 static gbt_status find_other_colours(grad_checker *c, const raster_reference *splats,
                                      const raster_settings *settings, bool *in_band, gbt_error *err)
 {
@@ -63,8 +67,8 @@ static gbt_status find_other_colours(grad_checker *c, const raster_reference *sp
     return GBT_OK;
 }
 
-/* The adjoint in double of d_masked, by the renderer's definition. `wanted` [GAUSSIANS_FIELD_COUNT][count],
-   zero before. */
+/* The double-precision adjoint of d_masked, by the renderer's definition. `wanted` is
+   [GAUSSIANS_FIELD_COUNT][count] and must be zero. */
 static gbt_status renderer_in_double(grad_checker *c, const raster_reference *splats,
                                      const raster_settings *settings, const double *d_rgb, double *wanted,
                                      gbt_error *err)
@@ -95,7 +99,7 @@ static gbt_status check_renderer(grad_checker *c, gbt_renderer renderer, const c
     frame *f = c->frame;
     f->draw.renderer = renderer;
     GBT_TRY(grad_render_at(c, c->view, c->width, err));
-    /* As frame.c draws splats: dilated where they have no footprint. */
+    /* As frame.c draws splats: dilated if the Gaussians have no footprint. */
     raster_settings settings = frame_splat_settings(&c->run->settings, RASTER_EWA);
     settings.dilation = f->widened ? 0 : settings.dilation;
     const raster_reference splats = {c->scene.count, c->scene.fields};

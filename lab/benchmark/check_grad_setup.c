@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* benchmark/check_grad_setup.c -- the view on which gradients are checked, and its memory. */
+/* benchmark/check_grad_setup.c -- choose the view on which gradients are checked, and allocate memory. */
 #include "benchmark/check_grad.h"
 
 #include "base/fail.h"
@@ -45,7 +45,7 @@ static gbt_status allocate(grad_checker *c, gbt_error *err)
     return fine ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* Small: the reference asks every Gaussian about every ray. */
+/* Render a view at a small size, because the reference tests every Gaussian on every ray. */
 static gbt_status take_view(grad_checker *c, size_t view, gbt_error *err)
 {
     c->view = view;
@@ -61,7 +61,7 @@ static gbt_status take_view(grad_checker *c, size_t view, gbt_error *err)
     return GBT_OK;
 }
 
-/* The first view that is not masked whole, of the held-out ones first. */
+/* The first view that is not masked completely, held-out views first. */
 gbt_status grad_set_up(grad_checker *c, gbt_error *err)
 {
     const scene *s = &c->run->scene;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/anchors.c -- the study "anchors": make its runs. */
+/* study/anchors.c -- the study "anchors": held-out PSNR against the number of anchors. Makes the runs. */
 #include "study/anchors.h"
 
 #include "base/fail.h"
@@ -15,7 +15,7 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     def.downscale = s->def.downscale;
     def.seed = (uint64_t)seed;
     def.save_every_seconds = 0;
-    def.find_exposure = false; /* scores must be of the same pixels */
+    def.find_exposure = false; /* so that scores of all variants are over the same pixels */
     def.command = "gbtrace study anchors";
     return study_runs_do_variant(folder, s->def.data[scene], s->grid.names[scene], v->name, v->settings, def,
                                  out, err);

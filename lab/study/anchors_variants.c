@@ -2,8 +2,8 @@
 /* study/anchors_variants.c -- the runs that the study "anchors" compares. */
 #include "study/anchors.h"
 
-/* THE table to edit: name, settings. The first three have their places. A new meaning needs a new name: the
-   name is the folder of the runs. */
+/* THE table to edit: name, settings. The order of the first three is fixed. If a variant changes its meaning
+   it needs a new name, because the name is the folder of its runs. */
 const anchors_variant anchors_variants[] = {
     {"voxels, final prune factor 1", "init = voxel\nfinal-prune-factor = 1"},
     {"the paper's balls", ""},

@@ -6,9 +6,9 @@
 #include "data/json_out.h"
 #include "study/anchors.h"
 
-enum { PAPER_BYTES_PER_ANCHOR = 316 }; /* 79 floats, as the paper counts */
+enum { PAPER_BYTES_PER_ANCHOR = 316 }; /* 79 floats, by the paper's accounting */
 
-/* ---- figures ---- */
+/* ---- statistics ---- */
 
 typedef enum figure { INITIAL, FINAL, BYTES, BLENDED, PSNR, SSIM, FIGURES } figure;
 
@@ -37,7 +37,8 @@ static stat_sample stat_over(const grid_study *s, size_t scene, size_t variant, 
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-/* Against another variant of the same seed: a difference, or per cent of the other. */
+/* A variant compared with `base` at the same seed: the difference, or the percentage of the value of `base`.
+ */
 static stat_sample change_over(const grid_study *s, size_t scene, size_t variant, size_t base, figure which,
                                bool relative)
 {
@@ -50,7 +51,7 @@ static stat_sample change_over(const grid_study *s, size_t scene, size_t variant
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-/* How many times smaller than the voxels' anchors at the paper's bytes. */
+/* How many times smaller the variant's anchors are than voxel anchors at the paper's bytes per anchor. */
 static double times_smaller(const grid_study *s, size_t scene, size_t variant)
 {
     return PAPER_BYTES_PER_ANCHOR * stat_over(s, scene, ANCHORS_VOXELS, FINAL).mean /

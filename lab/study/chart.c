@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/chart.c -- a scatter chart as SVG. Labels go where they cover neither a mark nor each other. */
+/* study/chart.c -- a scatter chart as SVG. Labels are placed where they cover neither a mark nor each other.
+ */
 #include "study/chart.h"
 
 #include <math.h>
@@ -19,7 +20,7 @@ static const char scatter_css[] =
     ".plot .level{stroke:var(--dim);stroke-width:1;stroke-dasharray:5 4}.plot "
     ".level-label{font-style:italic}\n";
 
-/* ---- room ---- */
+/* ---- placing labels ---- */
 
 typedef struct box {
     double x0, y0, x1, y1;
@@ -47,13 +48,14 @@ static void take(plane *p, box b)
         p->taken[p->taken_count++] = b;
 }
 
-/* How wide a text gets; letters of the fonts named above differ little. */
+/* Approximate width of a text; the letters of the fonts named above differ little. */
 static double text_width(const char *label, bool large)
 {
     return (large ? 8.4 : 6.3) * (double)strlen(label);
 }
 
-/* The first free place around a mark of the given radius: right, left, above, below, then the corners. */
+/* The first free position of a label around a mark of the given radius: right, left, above, below, then the
+   corners. */
 static bool find_room(plane *p, double x, double y, double radius, const char *label, bool large,
                       double *at_x, double *at_y)
 {
@@ -94,11 +96,11 @@ static bool find_plot(const scatter_chart *c, plot *p)
     for (size_t i = 0; i < c->point_count; i++)
         plot_take(p, c->points[i].x, c->points[i].y);
     for (size_t i = 0; i < c->level_count; i++)
-        plot_take(p, p->x.low, c->levels[i].y); /* nothing, when there is no point */
+        plot_take(p, p->x.low, c->levels[i].y); /* has no effect if there is no point */
     return plot_close(p);
 }
 
-/* A mark, its tag left open: a large diamond for series 0, else a circle. */
+/* Open the tag of a mark: a large diamond for series 0, else a circle. */
 static void draw_shape(text *out, int series, double x, double y)
 {
     if (series == 0)
@@ -163,7 +165,7 @@ static void draw_labels(text *out, const scatter_chart *c, plane *p, bool large)
     }
 }
 
-/* Dashed heights, each with its words above or below it, as far right as there is room. */
+/* Dashed horizontal lines. Each has its label above or below it, as far to the right as there is room. */
 static void draw_levels(text *out, const scatter_chart *c, plane *p)
 {
     for (size_t i = 0; i < c->level_count; i++) {
@@ -214,7 +216,7 @@ void scatter_draw(text *out, const scatter_chart *c, int top)
             take(&p, (box){x - r, y - r, x + r, y + r});
         }
     draw_joins(out, c, &p);
-    for (int pass = 0; pass < 2; pass++) /* the named ones on top */
+    for (int pass = 0; pass < 2; pass++) /* the named points last, on top */
         for (size_t i = 0; i < c->point_count; i++)
             if (can_show(&p, &c->points[i]) && (c->points[i].series == 0) == (pass == 1))
                 draw_mark(out, c, &p, &c->points[i]);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/crosscheck.c -- measure how far the tracer, the rasterizer and their double references are apart, and
-   what takes one to the other. */
+/* study/crosscheck.c -- the study "crosscheck": measure how far the tracer, the rasterizer and their
+   double-precision references differ, and which step from one renderer to the other causes how much. */
 #include "study/crosscheck.h"
 
 #include <math.h>
@@ -20,7 +20,7 @@
 #include "trace/rounding_band.h"
 #include "trace/trace.h"
 
-enum { REFERENCE_STEP = 8 }; /* as bench_reference: every 8th pixel in both directions */
+enum { REFERENCE_STEP = 8 }; /* as in bench_reference: every 8th pixel in both directions */
 
 /* ---- pictures ---- */
 
@@ -34,7 +34,8 @@ static raster_settings settings_of_step(const trace_settings *s, cross_step step
     return r;
 }
 
-/* Dilation stands in the place of the footprint that a run has given its Gaussians. */
+/* The Gaussians to draw at a step. Once splats are dilated, the run's footprint is taken off, since dilation
+   has the same purpose. */
 static const gaussians *gaussians_of_step(const bench_scene *s, cross_step step)
 {
     return step >= CROSS_DILATION ? &s->run.frame.gaussians : s->gaussians;
@@ -74,9 +75,9 @@ static bench_error compare(const image *a, const image *b)
     return bench_error_of(sum, max, count);
 }
 
-/* Per-ray form against tracer, both in float32. Pixels that differ by more than 1e-5 are looked at in double:
-   on those of the rounding band either may be right, and they are left out; `kept` is the share of the
-   others. */
+/* Compare the per-ray form with the tracer, both in float32. Pixels that differ by more than 1e-5 are
+   examined in double: in the rounding band either may be right, so these are left out. `kept` is the share of
+   the remaining pixels. */
 static gbt_status compare_outside_band(const bench_scene *s, const trace_settings *settings,
                                        const image *traced, const image *splatted, double *psnr, double *kept,
                                        gbt_error *err)
@@ -111,10 +112,10 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
 /* ---- references ---- */
 
 typedef struct references {
-    bench_reference rays, splats; /* splats borrows the rays, of which only the size counts */
+    bench_reference rays, splats; /* splats uses the rays of the former, only for their number */
 } references;
 
-/* Of the rays, and of the splats of `step`, which has EWA projection. */
+/* The double-precision pictures of the rays, and of the splats at `step`, which uses EWA projection. */
 static gbt_status make_references(const bench_scene *s, const trace_settings *settings, cross_step step,
                                   references *out, gbt_error *err)
 {
@@ -140,7 +141,7 @@ static void references_free(references *r)
     bench_reference_free(&r->rays);
 }
 
-/* The three renderers with their own cut-offs against double. */
+/* Compare the three renderers with double precision, each with the model's own cut-offs. */
 static gbt_status compare_own(const bench_scene *s, const image *traced, const image pictures[CROSS_STEPS],
                               cross_view *out, gbt_error *err)
 {
@@ -155,8 +156,8 @@ static gbt_status compare_own(const bench_scene *s, const image *traced, const i
     return status;
 }
 
-/* The same with the cut-offs of the preset "exact", so that a response that rounds to the other side of a cut
-   does not show. */
+/* The same with the cut-offs of the preset "exact", so low that a response that rounds to the other side of a
+   cut-off is invisible. */
 static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_view *out, gbt_error *err)
 {
     references want = {0};
@@ -175,8 +176,8 @@ static gbt_status compare_exact(const bench_scene *s, image scratch[3], cross_vi
     if (status == GBT_OK)
         status = compare_outside_band(s, &settings, &scratch[0], &scratch[1], &psnr, &kept, err);
     if (status == GBT_OK) {
-        cross_check *c =
-            out->checks + 2; /* splats a thousand pixels long lose digits in float32, hence the last limit */
+        cross_check *c = out->checks + 2; /* splats a thousand pixels long lose digits in float32, hence the
+                                             last of these limits */
         c[0] = (cross_check){"preset exact: per-ray form to tracer outside the rounding band, dB", 100, psnr};
         c[1] = (cross_check){"preset exact: share of pixels outside that band", 0.999, kept};
         c[2] = (cross_check){"preset exact: tracer to double reference outside that band, dB", 100,
@@ -200,7 +201,7 @@ static void name_sheet(const char *of, cross_view *v)
     memcpy(v->sheet, name, sizeof name);
 }
 
-/* With `pictures` and `traced` of the size of the camera. */
+/* Measure one view; `pictures` and `traced` have the size of the camera. */
 static gbt_status measure_pictures(const bench_scene *s, const char *folder, image *traced,
                                    image pictures[CROSS_STEPS], image scratch[3], cross_view *out,
                                    gbt_error *err)
@@ -241,8 +242,8 @@ static gbt_status measure_view(bench_scene *s, const char *folder, cross_view *o
     return status;
 }
 
-/* The shot as a pinhole takes it: the same pose, size and field of view, no aperture, no rolling shutter.
-   False when it is one already. */
+/* Replace the shot by a pinhole of the same pose, size and field of view, without aperture and rolling
+   shutter. False if it already is one. */
 static bool make_pinhole(ray_shot *shot)
 {
     gbt_camera from = shot->camera;
@@ -276,7 +277,7 @@ static gbt_status measure_shot(bench_scene *s, const ray_shot *shot, const char 
     return measure_view(s, folder, v, err);
 }
 
-/* Held-out views, spread over all of them; all views when none is held out. */
+/* Measure held-out views, evenly sampled; all views if none is held out. */
 static gbt_status measure_run(bench_scene *s, const char *folder, cross_model *out, gbt_error *err)
 {
     const loaded_run *run = &s->run;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/crosscheck.h -- the measurements of the study "tracer against rasterizer", and how they are written
-   down. */
+/* study/crosscheck.h -- the study "crosscheck", tracer against rasterizer: what is measured, and its output.
+ */
 #ifndef GBT_STUDY_CROSSCHECK_H
 #define GBT_STUDY_CROSSCHECK_H
 
@@ -12,7 +12,7 @@
 
 enum { CROSS_MODELS_MAX = 16, CROSS_VIEWS_MAX = 4, CROSS_CHECKS = 7, CROSS_NAME_SIZE = 320 };
 
-/** From the tracer to the splats of 3DGS, one change at a time; each keeps the changes before it. */
+/** From the tracer to the splats of 3DGS, one change at a time; each step keeps the earlier changes. */
 typedef enum cross_step {
     CROSS_TILES,
     CROSS_ORDER,
@@ -22,19 +22,20 @@ typedef enum cross_step {
     CROSS_STEPS
 } cross_step;
 
-/** What is held to a limit. */
+/** A value with a limit. */
 typedef struct cross_check {
     const char *row;
-    double limit, value; /* value >= limit is a pass; NaN is none */
+    double limit, value; /* passes if value >= limit; NaN fails */
 } cross_check;
 
 typedef struct cross_view {
-    char name[256], sheet[CROSS_NAME_SIZE]; /* of the view; file name of its pictures */
+    char name[256], sheet[CROSS_NAME_SIZE]; /* name of the view; file name of its sheet of pictures */
     int width, height;
     size_t gaussians;
-    bool stand_in; /* the camera has a lens that splats cannot have: its pinhole was taken */
-    bench_error step[CROSS_STEPS], total[CROSS_STEPS]; /* to the picture before; to the tracer's */
-    bench_error traced, per_ray, splat; /* to the double references, with the model's own cut-offs */
+    bool stand_in; /* splats do not support the camera's lens: a pinhole replaced it */
+    bench_error step[CROSS_STEPS], total[CROSS_STEPS]; /* to the previous step's picture; to the tracer's */
+    bench_error traced, per_ray,
+        splat; /* to the double-precision references, with the model's own cut-offs */
     cross_check checks[CROSS_CHECKS];
 } cross_view;
 
@@ -49,21 +50,23 @@ typedef struct cross_study {
     size_t model_count;
 } cross_study;
 
-/** Differences are shown times this; the step CROSS_TILES, which is rounding alone, times the second. */
+/** Factor by which differences are amplified for display; for CROSS_TILES, which changes rounding only, the
+    second. */
 enum { CROSS_AMPLIFIED = 8, CROSS_AMPLIFIED_TILES = 1000 };
 
 /**
- * One PNG of eight pictures, four across: tracer, splats, their difference, that of the tiles; order,
- * projection, dilation, cut-offs.
+ * Write one PNG with eight pictures, four per row. First row: tracer, splats, their difference, the
+ * difference of the step CROSS_TILES. Second row: the differences of order, projection, dilation and
+ * cut-offs.
  *
  * @param traced   [in] the tracer's picture
- * @param pictures [in] after each step
+ * @param pictures [in] the picture after each step
  * @return GBT_OK, GBT_ERR_NO_MEMORY, GBT_ERR_IO
  */
 gbt_status cross_write_sheet(const image *traced, const image pictures[CROSS_STEPS], const char *path,
                              gbt_error *err);
 
-/** How it is written down. */
+/** The files that the study writes. */
 extern const study_output cross_output;
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/crosscheck_sheet.c -- the pictures of one view on one sheet, differences in the colours of the
-   report. */
+/* study/crosscheck_sheet.c -- all pictures of one view in one PNG, differences in the report's error colours.
+ */
 #include <math.h>
 
 #include "base/fail.h"
@@ -9,13 +9,13 @@
 
 enum { PANELS_ACROSS = 4, PANELS_DOWN = 2, PANEL_SIDE_MAX = 512, PANEL_GAP = 4 };
 
-/* What one panel shows: a picture, or the difference of two. */
+/* One panel: a picture, or the difference of two. */
 typedef struct panel {
-    const image *shown, *before; /* before NULL: the picture itself */
+    const image *shown, *before; /* before NULL: show the picture itself */
     float amplified;
 } panel;
 
-/* The largest difference of a channel, times `amplified`. */
+/* Colour of a pixel; for differences, of the largest over the channels, amplified. */
 static void panel_color(const panel *p, size_t pixel, float rgb[3])
 {
     const float *a = p->shown->pixels + 3 * pixel;
@@ -30,7 +30,7 @@ static void panel_color(const panel *p, size_t pixel, float rgb[3])
     error_color((double)(p->amplified * most), rgb);
 }
 
-/* Averaged down by a whole factor. */
+/* Draw a panel, scaled down by a whole factor. */
 static void draw_panel(const panel *p, int factor, int left, int top, image *sheet)
 {
     const int width = p->shown->width / factor, height = p->shown->height / factor;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/crosscheck_write.c -- the study "tracer against rasterizer" as tables, as data, and as a chart. */
+/* study/crosscheck_write.c -- the study "crosscheck" as tables, JSON and a chart. */
 #include <jansson.h>
 #include <math.h>
 
@@ -17,7 +17,7 @@ enum {
     PICTURE_WIDTH = 760
 };
 
-/* What changes with a step: a word or two; and a sentence. */
+/* What a step changes: in a word or two (step_name), and as a sentence. */
 static const char *step_name(cross_step step)
 {
     static const char *const names[CROSS_STEPS] = {"tiles", "order", "projection", "dilation", "cut-offs"};
@@ -158,7 +158,7 @@ static const char bar_css[] =
 
 static int view_height(void) { return CROSS_STEPS * (BAR_HEIGHT + BAR_GAP) + VIEW_GAP; }
 
-/* The longer, the closer: from 10 to 120 dB. */
+/* Right end of a bar on a scale from 10 to 120 dB: the closer two pictures are, the longer the bar. */
 static double bar_end(double psnr)
 {
     return LABEL_WIDTH + (BARS_RIGHT - LABEL_WIDTH) * fmin(fmax((psnr - 10) / 110, 0), 1);

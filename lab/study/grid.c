@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/grid.c -- scenes x variants x seeds: making all runs of a study. */
+/* study/grid.c -- make all runs of a study: scenes x variants x seeds. */
 #include "study/grid.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ void study_grid_close(study_grid *g)
     g->figures = NULL;
 }
 
-/* Run `number` of `count`, from 1 on, begins. */
+/* Report that run `number` of `count` begins; numbers start at 1. */
 static void tell(size_t number, size_t count)
 {
     char line[64];
@@ -57,7 +57,7 @@ static void tell(size_t number, size_t count)
     log_progress(&e);
 }
 
-/* Every `step`-th run, from `first` on. */
+/* Make every `step`-th run, starting with `first`. */
 static gbt_status fill(study_grid *g, const bool *wanted, study_grid_run *run, const void *study,
                        const char *folder, size_t first, size_t step, gbt_error *err)
 {
@@ -76,8 +76,8 @@ static gbt_status fill(study_grid *g, const bool *wanted, study_grid_run *run, c
     return GBT_OK;
 }
 
-/* With several processes each makes its share of the runs by itself; then the first one finds them all made.
- */
+/* Several processes first make their shares of the runs independently; then the first process goes through
+   all runs and finds them finished. */
 gbt_status study_grid_report(study_grid *g, const bool *wanted, study_grid_run *run,
                              const study_output *output, const void *study, const char *folder, FILE *out,
                              gbt_error *err)

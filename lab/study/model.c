@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/model.c -- the models that a study is given: what they are called, and where the camera of plain
-   Gaussians is. */
+/* study/model.c -- the models given to a study: their names, and the cameras of plain Gaussians. */
 #include "study/model.h"
 
 #include <stdio.h>

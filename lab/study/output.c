@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/output.c -- the files of a study. */
+/* study/output.c -- write the files of a study. */
 #include "study/output.h"
 
 #include "base/fail.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper.c -- the study "paper": which runs its tables need, and making them. */
+/* study/paper.c -- the study "paper": find out which runs its tables need, and make them. */
 #include "study/paper.h"
 
 #include <stdio.h>
@@ -9,7 +9,7 @@
 
 enum { LEAST_ITERATIONS = 20 };
 
-/* "1,3": digits of tables, each once, with commas between. */
+/* Parse "1,3": comma-separated numbers of tables, each at most once. */
 static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 1], gbt_error *err)
 {
     for (const char *at = list;; at += 2) {
@@ -22,7 +22,7 @@ static gbt_status choose_tables(const char *list, bool has_table[PAPER_TABLES + 
     }
 }
 
-/* Which tables and variants, and what the scenes say. */
+/* Choose tables and variants, and look at the scenes' points. */
 static gbt_status plan(paper_study *s, gbt_error *err)
 {
     const lab_runs_def *def = &s->def;
@@ -48,14 +48,15 @@ static gbt_status run_one(const void *study, size_t scene, size_t variant, int s
     const paper_study *s = study;
     const paper_variant *v = &paper_variants[variant];
     if (v->max_depth < PAPER_DEPTH_MAX && v->max_depth >= s->scenes[scene].tree_depth) {
-        *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the same balls, so the same run to the bit */
+        *out = *paper_run(s, scene, PAPER_GBSP, seed); /* the depth limit has no effect on this scene, so the
+                                                          run is identical to the bit */
         return GBT_OK;
     }
     gbt_train_def def = gbt_train_def_default();
     def.compat = true;
     def.eval_split = s->def.eval_split;
     def.save_every_seconds = 0;
-    /* As compat has them: a new default must not make old runs look like others. */
+    /* Set what `compat` implies explicitly, so that new defaults do not make finished runs look outdated. */
     def.step_pixels = 0;
     def.splats_until = 0;
     def.footprint = 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_chart.c -- the charts of the study "paper": spreads by scene and variant, and anchors against
-   PSNR. */
+/* study/paper_chart.c -- the charts of the study "paper": one dot plot per scene, and anchors against PSNR.
+ */
 #include <math.h>
 #include <stdio.h>
 
@@ -8,7 +8,7 @@
 #include "study/chart.h"
 #include "study/paper.h"
 
-/* A panel per scene: a row per variant, and two plots side by side. */
+/* One panel per scene, with a row per variant and two plots side by side. */
 enum { NAMES_RIGHT = 196, PLOT_WIDTH = 252, PLOT_GAP = 38, ROW = 24, HEAD = 44, FOOT = 42, MARGIN = 12 };
 
 static const char css[] =
@@ -17,8 +17,8 @@ static const char css[] =
 
 static int panel_height(size_t variant_count) { return HEAD + ROW * (int)variant_count + FOOT; }
 
-/* The axis of one figure for everything that will be drawn: means, their spreads, single seeds. False without
-   any of it. */
+/* Fit the axis of one figure to everything that will be drawn: means, spreads, single seeds. False if there
+   is nothing. */
 static bool find_plot(const paper_study *s, size_t scene, const paper_variant_id *variants, size_t count,
                       paper_figure figure, plot *p)
 {
@@ -115,7 +115,7 @@ static void draw_growth(text *out, const paper_study *s, size_t scene, int top)
     scatter_draw(out, &chart, top);
 }
 
-/* ---- the picture ---- */
+/* ---- the file ---- */
 
 void paper_charts(const void *study, text *out)
 {

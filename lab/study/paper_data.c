@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_data.c -- the study "paper" as data: rows, changes and figures in JSON. */
+/* study/paper_data.c -- the study "paper" as JSON: rows, changes and figures. */
 #include <math.h>
 #include <stdio.h>
 
@@ -7,15 +7,17 @@
 #include "data/json_out.h"
 #include "study/paper.h"
 
-/* The balls of real points against the closed form: ties and stopped sets move it. */
+/* Largest relative difference between the number of balls of real points and paper_ball_count(); ties and
+   sets that are not split cause it. */
 static const double ball_count_limit = 0.015;
 
-/* How far the balls of a scene are from the closed form, for each depth that was trained. */
+/* Compare the initial number of balls with paper_ball_count(), for each depth that was trained. */
 static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
 {
     for (int v = 0; v < PAPER_VARIANTS; v++) {
         const bool from_balls = paper_variants[v].init == GBT_INIT_GB;
-        const bool is_first = v == PAPER_GBSP || v >= PAPER_DEPTH_10; /* of the same balls */
+        const bool is_first =
+            v == PAPER_GBSP || v >= PAPER_DEPTH_10; /* other variants start from the balls of PAPER_GBSP */
         if (!s->has_variant[v] || !from_balls || !is_first)
             continue;
         char row[STUDY_NAME_SIZE + 80];
@@ -30,7 +32,7 @@ static void add_count_rows(const paper_study *s, size_t scene, json_t *rows)
     }
 }
 
-/* A change is no promise: without a limit. */
+/* Changes have no limit, because the paper's are not promised for other scenes. */
 static void add_change_rows(const paper_study *s, json_t *rows)
 {
     for (size_t i = 0; i < paper_claim_count; i++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_figures.c -- the figures of runs, their means and spreads, and the changes from one variant to
-   another. */
+/* study/paper_figures.c -- figures of single runs, their statistics over seeds, and changes between variants.
+ */
 #include <math.h>
 
 #include "study/paper.h"
@@ -76,7 +76,7 @@ stat_sample paper_change(const paper_study *s, size_t scene, paper_variant_id va
     return stat_of(values, (size_t)s->grid.seeds);
 }
 
-/* ---- the changes that are looked at ---- */
+/* ---- the changes that are compared ---- */
 
 #define BALLS_FOR_VOXELS "balls in place of voxels"
 #define GBAI_FOR_VOXELS "GBAI in place of voxels"

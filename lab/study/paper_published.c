@@ -6,10 +6,10 @@
 
 #include "study/paper.h"
 
-/* Anchors in thousands, storage in MiB, the paper's GFLOPs of the networks. NaN: not given. */
+/* Anchors in thousands, storage in MiB, GFLOPs of the networks as the paper counts them. NaN: not given. */
 typedef struct published_row {
     int table;
-    const char *scene; /* or the mean over a data set */
+    const char *scene; /* or the name of a data set, for its mean */
     paper_variant_id variant;
     double initial, final, storage, arithmetic, psnr, ssim, lpips;
 } published_row;
@@ -90,7 +90,7 @@ static double change(const paper_claim *claim, double from, double to)
     return paper_figure_texts[claim->figure].is_relative ? 100 * (to / from - 1) : to - from;
 }
 
-/* The next pair of rows of one scene for a claim, from `*at` on. */
+/* The next pair of rows of one scene that belongs to a claim, searching from `*at` on. */
 static bool next_pair(const paper_claim *claim, size_t *at, double *from, double *to)
 {
     for (; *at < sizeof rows / sizeof *rows; ++*at) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_scene.c -- what a scene's points say before any training: how deep the balls go, and the
-   constant that GBSP comes to. */
+/* study/paper_scene.c -- what a scene's points tell before any training: the depth of the balls, and the mean
+   scale factor of GBSP. */
 #include <limits.h>
 #include <math.h>
 
@@ -9,12 +9,13 @@
 #include "data/scene.h"
 #include "study/paper.h"
 
-/* A singleton's GBSP scale is 0.625 of its spacing (half of it, and half of the clip's lower end). */
+/* A ball of a single point gets a GBSP scale of 0.625 of its spacing: half the spacing, plus half of the
+   lower end of the clip range. */
 static const double constant_of_singletons = 0.625;
 
 double paper_ball_count(double points, int max_depth)
 {
-    /* At each depth there are sets of n and of n + 1 points only. */
+    /* At each depth only two sizes of sets occur, n and n + 1 points. */
     double n = points, sets = 1, larger = 0, done = 0;
     for (int depth = 0; depth < max_depth && sets + larger > 0; depth++) {
         if (n <= 2)
@@ -22,7 +23,8 @@ double paper_ball_count(double points, int max_depth)
         if (n + 1 <= 2)
             done += larger, larger = 0;
         const double half = floor(n / 2), odd = n - 2 * half;
-        /* n gives n/2 twice, or n/2 and n/2 + 1; n + 1 gives the same, or n/2 + 1 twice. */
+        /* A set of n points is split into n/2 twice, or n/2 and n/2 + 1; one of n + 1 into the same, or n/2 +
+         * 1 twice. */
         const double small = odd == 0 ? 2 * sets + larger : sets,
                      large = odd == 0 ? larger : sets + 2 * larger;
         n = half;
@@ -32,7 +34,7 @@ double paper_ball_count(double points, int max_depth)
     return points < 1 ? 0 : done + sets + larger;
 }
 
-/* As training with `compat` makes them. */
+/* Make anchors as training with `compat` does. */
 static gbt_status make_anchors(const scene_points *points, double voxel_size, gbt_scale_prior scale,
                                anchors *out, balls *out_balls, gbt_error *err)
 {
@@ -62,7 +64,8 @@ static gbt_status look_at_points(const scene_points *points, double voxel_size, 
             sum += (double)prior.scale_log[6 * i] - (double)spacing.scale_log[6 * i];
             out->tree_depth = found.depth[i] > out->tree_depth ? found.depth[i] : out->tree_depth;
         }
-        out->scale_constant = fmin(fmax(exp(sum / (double)found.count), 0.01), 100); /* what a run takes */
+        out->scale_constant = fmin(fmax(exp(sum / (double)found.count), 0.01),
+                                   100); /* limited to the range that training accepts */
     }
     balls_free(&found);
     anchors_free(&prior);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/paper_tables.c -- the study "paper" in Markdown: our tables, the changes beside the paper's, and in
-   words what they say. */
+/* study/paper_tables.c -- the study "paper" in Markdown: our tables, our changes beside the paper's, and how
+   they compare in words. */
 #include <limits.h>
 #include <math.h>
 
@@ -18,7 +18,7 @@ static const paper_figure columns_compact[] = {PAPER_INITIAL, PAPER_FINAL, PAPER
 static const paper_figure columns_growth[] = {PAPER_FINAL, PAPER_ARITHMETIC, PAPER_BLENDED,
                                               PAPER_PSNR,  PAPER_SSIM,       PAPER_LPIPS};
 
-/* The whole runs are the last row of what varies. */
+/* In tables that vary one setting, the full method is the last row, named by its value of that setting. */
 static const char *row_name(int table, paper_variant_id variant)
 {
     if (table == 3 && (variant == PAPER_VOXEL || variant == PAPER_GBSP))
@@ -31,7 +31,7 @@ static void add_figures(const paper_study *s, int table, text *out)
     const paper_figure *columns = table == 3 ? columns_growth : columns_compact;
     size_t column_count =
         table == 3 ? sizeof columns_growth / sizeof *columns : sizeof columns_compact / sizeof *columns;
-    column_count -= !paper_is_measured(s, columns[column_count - 1]); /* the last is LPIPS */
+    column_count -= !paper_is_measured(s, columns[column_count - 1]); /* the last column is LPIPS */
     const paper_variant_id *variants;
     const size_t variant_count = paper_table_variants(table, &variants);
     text_add(out, "| scene | SfM points | start |");
@@ -89,7 +89,8 @@ const char *paper_verdict_of(const stat_sample *ours, double published, const do
 const char *paper_verdict(const stat_sample *ours, const paper_claim *claim)
 {
     double range[2];
-    paper_published_range(claim, range); /* an empty one, from infinity down, holds nothing */
+    paper_published_range(claim, range); /* if there is none, an empty range from infinity down, which
+                                            contains nothing */
     return paper_verdict_of(ours, paper_published(claim), range);
 }
 
@@ -135,7 +136,7 @@ static void add_changes(const paper_study *s, int table, text *out)
             add_change_row(s, &paper_claims[i], out);
 }
 
-/* ---- the page ---- */
+/* ---- the document ---- */
 
 static void add_scenes(const paper_study *s, text *out)
 {

@@ -2,10 +2,10 @@
 /* study/paper_variants.c -- the runs of the study "paper", and which of them each table compares. */
 #include "study/paper.h"
 
-/* The paper's growth ends at half of its run, 15000 of 30000. */
+/* The paper's growth ends after half of the run, at iteration 15000 of 30000. */
 static const double full = 0.5, third = 1.0 / 3, sixth = 1.0 / 6;
 
-/* Names are folders of runs: a change of a row's meaning needs another name. */
+/* Names are folders of runs: if a row changes its meaning it needs a new name. */
 const paper_variant paper_variants[PAPER_VARIANTS] = {
     [PAPER_VOXEL] = {"voxel", "voxels", GBT_INIT_VOXEL, GBT_SCALE_PRIOR_NN, false, full, PAPER_DEPTH_MAX},
     [PAPER_GBSP] = {"gbai-gbsp", "GBAI + GBSP", GBT_INIT_GB, GBT_SCALE_PRIOR_GB, false, full,

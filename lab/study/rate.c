@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/rate.c -- code a model at a ladder of qualities, read it back, score it on the held-out views. */
+/* study/rate.c -- the study "rate": compress a model at a series of qualities, read each file back, and score
+   it on the held-out views. */
 #include "study/rate.h"
 
 #include <math.h>
@@ -33,7 +34,7 @@ static gbt_status score_view(loaded_run *r, size_t view, image_scores *scores, g
     return status;
 }
 
-/* As gbtrace eval: means over the held-out views that are not masked whole, NaN without them. */
+/* As gbtrace eval: means over the held-out views that are not masked completely; NaN without any. */
 static gbt_status score_model(loaded_run *r, size_t *views, double *psnr, double *ssim, gbt_error *err)
 {
     image_scores sum = {0}, scores = {0};
@@ -98,7 +99,7 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
     out->probe_seconds = clock_wall() - start;
     int left_out = 0;
     for (size_t i = 0; i < sizeof ladder / sizeof *ladder && status == GBT_OK; i++) {
-        if (ladder[i] > 0 && !model_positions_fit(&r->model, &s, ladder[i])) { /* as gbt_compress() */
+        if (ladder[i] > 0 && !model_positions_fit(&r->model, &s, ladder[i])) { /* as in gbt_compress() */
             left_out++;
             continue;
         }
@@ -157,7 +158,7 @@ gbt_status lab_study_rate(const lab_study_def *def, const char *folder, FILE *ou
     for (; study->model_count < def->model_count && status == GBT_OK; study->model_count++)
         status =
             measure_model(def->models[study->model_count], path, &study->models[study->model_count], err);
-    unlink(path); /* the file that every row was written to */
+    unlink(path); /* every row was written to this one file */
     if (status == GBT_OK)
         status = study_output_save(&rate_output, study, folder, out, err);
     mem_free(study);

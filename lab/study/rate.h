@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/rate.h -- the measurements of the study "rate": what a small model file costs in picture, and how
-   they are written down. */
+/* study/rate.h -- the study "rate": how much quality a small model file costs. What is measured, and its
+   output. */
 #ifndef GBT_STUDY_RATE_H
 #define GBT_STUDY_RATE_H
 
@@ -9,19 +9,18 @@
 
 enum { RATE_MODELS_MAX = 6, RATE_ROWS_MAX = 12 };
 
-/** One file that was made of a model. */
+/** One compressed file of a model. */
 typedef struct rate_row {
     double quality; /* dB; 0: lossless */
     model_sizes sizes;
-    double psnr,
-        ssim; /* of the model that the file gives back, mean over the held-out views; NaN without them */
+    double psnr, ssim; /* of the decompressed model, mean over the held-out views; NaN without any */
     double encode_seconds, decode_seconds;
 } rate_row;
 
 typedef struct rate_model {
     char name[256];
     size_t anchors, plain_bytes, views;
-    double psnr, ssim; /* of the model as it was trained */
+    double psnr, ssim; /* of the uncompressed model */
     double probe_seconds;
     rate_row rows[RATE_ROWS_MAX];
     size_t row_count;
@@ -32,7 +31,7 @@ typedef struct rate_study {
     size_t model_count;
 } rate_study;
 
-/** How it is written down. */
+/** The files that the study writes. */
 extern const study_output rate_output;
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/rate_write.c -- the study "rate" as tables, as data, and as a chart. */
+/* study/rate_write.c -- the study "rate" as tables, JSON and a chart. */
 #include <jansson.h>
 #include <stdio.h>
 
@@ -8,8 +8,8 @@
 #include "study/chart.h"
 #include "study/rate.h"
 
-/* What a coded model should keep to: a twelfth of a baseline with 1 / 0.7 as many anchors of 316 bytes, and
-   what nobody sees. */
+/* Goals for a compressed model: bytes per anchor such that it is a twelfth of a baseline with 1 / 0.7 as many
+   anchors of 316 bytes, and an invisible loss in dB. */
 static const double bytes_limit = 37, loss_limit = 0.05;
 
 static double per_anchor(const rate_model *m, size_t bytes)
@@ -110,7 +110,7 @@ static json_t *data_of(const void *of)
     return json_pack("{s:o,s:o}", "models", models, "rows", checks);
 }
 
-/* One line per model: what a byte buys. Without loss there is no place on it. */
+/* One curve per model: PSNR against bytes. The lossless file is left out: it has no quality in dB. */
 static void add_charts(const void *of, text *out)
 {
     const rate_study *study = of;

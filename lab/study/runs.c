@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/runs.c -- one training run of a study: made, or taken from an earlier call; its figures read back.
-
-   study.json says what run this is and holds what is measured here; it is removed first and written last. */
+/* study/runs.c -- one training run of a study: make it, or reuse it from an earlier call; read its figures
+   back. study.json records the run's settings and the figures measured here. It is removed first and written
+   last, so that it exists only beside a complete run. */
 #include "study/runs.h"
 
 #include <ctype.h>
@@ -53,7 +53,7 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
     if (data == NULL || count < 1 || count > STUDY_SCENES_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "study: wanted 1 to %d data sets", (int)STUDY_SCENES_MAX);
     for (size_t i = 0; i < count; i++) {
-        char *whole = realpath(data[i], NULL); /* "." has a name too */
+        char *whole = realpath(data[i], NULL); /* so that "." has a name too */
         if (whole == NULL)
             return base_fail(err, GBT_ERR_IO, "%.400s: no such data set", data[i]);
         snprintf(names[i], STUDY_NAME_SIZE, "%s", strrchr(whole, '/') + 1);
@@ -71,10 +71,10 @@ gbt_status study_runs_names(const char *const *data, size_t count, char names[][
     return GBT_OK;
 }
 
-/* ---- what run it is ---- */
+/* ---- identity of a run ---- */
 
-/* Everything that decides the figures: the settings as asked for, how small the file is made, and when scores
-   are taken in passing. */
+/* Everything that affects the figures: the requested settings, the compression, and when intermediate scores
+   are taken. */
 static void settings_text(const char *data, const gbt_train_def *def, char *out, size_t size)
 {
     config_text(def, data, out, size);
@@ -85,7 +85,7 @@ static void settings_text(const char *data, const gbt_train_def *def, char *out,
         used += (size_t)snprintf(out + used, size - used, " %.9g", def->eval_at_seconds[i]);
 }
 
-/* ---- read back ---- */
+/* ---- reading back ---- */
 
 static bool read_number(const json_t *object, const char *field, double *out)
 {
@@ -94,7 +94,7 @@ static bool read_number(const json_t *object, const char *field, double *out)
     return json_is_number(value);
 }
 
-/* A score, which null says there is none of. */
+/* Read a score; null means that there is none. */
 static bool read_score(const json_t *object, const char *field, double *out)
 {
     return read_number(object, field, out) || json_is_null(json_object_get(object, field));
@@ -133,7 +133,8 @@ static bool read_measured(const json_t *s, study_figures *f)
            read_number(s, "network_bytes", &f->network_bytes);
 }
 
-/* True when the run is whole and of these settings. What is damaged or missing is simply not finished. */
+/* Read a finished run with these settings. False if anything is missing or damaged: then the run counts as
+   not finished. */
 static bool read_run(const char *study_path, const char *metrics_path, const char *settings,
                      study_figures *out)
 {
@@ -141,7 +142,8 @@ static bool read_run(const char *study_path, const char *metrics_path, const cha
     gbt_error ignored = {0};
     bool fine = json_read(study_path, &study, &ignored) == GBT_OK &&
                 json_read(metrics_path, &metrics, &ignored) == GBT_OK;
-    json_t *ours = json_text(settings); /* as it was saved, whatever bytes a path has */
+    json_t *ours = json_text(settings); /* through the same conversion as when it was saved, since paths may
+                                           hold any bytes */
     fine = fine && json_equal(json_object_get(study, "settings"), ours) && read_measured(study, out) &&
            read_metrics(metrics, out);
     json_decref(ours);
@@ -150,7 +152,7 @@ static bool read_run(const char *study_path, const char *metrics_path, const cha
     return fine;
 }
 
-/* ---- measured here ---- */
+/* ---- measuring ---- */
 
 static double network_macs(const decoder *d)
 {
@@ -203,7 +205,7 @@ static gbt_status save_measured(const char *path, const char *settings, const st
     return status;
 }
 
-/* ---- the run ---- */
+/* ---- making the run ---- */
 
 static void remove_checkpoints(const char *run)
 {
@@ -214,7 +216,8 @@ static void remove_checkpoints(const char *run)
             remove(path);
 }
 
-/* An interrupted run starts anew: sums and scores taken in passing are not in its checkpoint. */
+/* An interrupted run starts from the beginning, because its checkpoint lacks the sums and intermediate
+   scores. */
 static gbt_status train(const char *data, const char *run, const gbt_train_def *def, gbt_error *err)
 {
     gbt_error why = {0};
@@ -243,15 +246,15 @@ static gbt_status make_run(const char *data, const char *run, const gbt_train_de
     GBT_TRY(file_join(file, sizeof file, run, "model.gbt", err));
     unlink(study_path);
     GBT_TRY(train(data, run, def, err));
-    GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* scored is the file that `gbtrace train` leaves
-                                                             */
+    GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* so that scores are of the file that `gbtrace
+                                                               train` leaves */
     GBT_TRY(score(run, network, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
     return save_measured(study_path, settings, &measured, err);
 }
 
-/* Whether a run has the scores of this kind of network; of none (NULL) always. */
+/* Whether a run has been scored with this LPIPS network; without one (NULL), always true. */
 static gbt_status is_scored_by(const char *file, const char *metrics_path, bool *scored, gbt_error *err)
 {
     lpips *net = NULL;
@@ -275,7 +278,7 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
     char study_path[PATH_SIZE], metrics_path[PATH_SIZE], settings[SETTINGS_SIZE];
     GBT_TRY(file_join(study_path, sizeof study_path, run, "study.json", err));
     GBT_TRY(file_join(metrics_path, sizeof metrics_path, run, "metrics.json", err));
-    char *whole = realpath(data, NULL); /* one data set has one name */
+    char *whole = realpath(data, NULL); /* one data set, one name */
     settings_text(whole != NULL ? whole : data, def, settings, sizeof settings);
     free(whole);
     if (read_run(study_path, metrics_path, settings, out)) {

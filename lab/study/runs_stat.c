@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/runs_stat.c -- mean and spread of figures over runs, and what so few runs can tell. */
+/* study/runs_stat.c -- mean and spread of figures over few runs, with confidence intervals. */
 #include "study/runs_stat.h"
 
 #include <math.h>
@@ -29,7 +29,7 @@ stat_sample stat_of(const double *values, size_t count)
 double stat_half_width(const stat_sample *s)
 {
     static const double t95[] = {12.706, 4.303, 3.182, 2.776, 2.571,
-                                 2.447,  2.365, 2.306, 2.262}; /* 1 to 9 degrees of freedom */
+                                 2.447,  2.365, 2.306, 2.262}; /* for 1 to 9 degrees of freedom */
     const size_t most = sizeof t95 / sizeof *t95;
     if (s->count < 2)
         return NAN;
@@ -38,13 +38,14 @@ double stat_half_width(const stat_sample *s)
 
 bool stat_is_apart(const stat_sample *s, double value)
 {
-    return fabs(s->mean - value) > stat_half_width(s) + 1e-12 * fabs(value); /* false when the width is NaN;
-                                                                                sums of equal numbers round */
+    return fabs(s->mean - value) >
+           stat_half_width(s) + 1e-12 * fabs(value); /* false if the width is NaN; the tolerance is for
+                                                        rounding in the sum of equal numbers */
 }
 
 void stat_add_change(text *out, double value, int decimals)
 {
-    const double least = 0.5 * pow(10, -decimals); /* what rounds to zero has no sign */
+    const double least = 0.5 * pow(10, -decimals); /* a value that rounds to zero gets no sign */
     text_format(out, fabs(value) < least ? "%.*f" : "%+.*f", decimals, fabs(value) < least ? 0 : value);
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/speed.c -- measure what each setting costs and what it does to the picture. */
+/* study/speed.c -- the study "speed": measure the cost of each setting and its effect on the picture. */
 #include "study/speed.h"
 
 #include <math.h>
@@ -14,17 +14,17 @@
 #include "raster/raster.h"
 #include "study/model.h"
 
-/* ---- what is tried ---- */
+/* ---- the settings to measure ---- */
 
-/* One step of one knob; the others stand as in the preset "default". */
+/* One value of one setting (a knob); all other settings are as in the preset "default". */
 typedef struct speed_step {
     speed_knob knob;
     const char *value;
-    float number; /* of the knob; 0: the default itself */
-    int choice;   /* preset, kernel or instruction set */
+    float number; /* value of the knob; 0: the default */
+    int choice;   /* index of a preset, kernel or instruction set */
 } speed_step;
 
-/* Along each knob from exact to fast, through the default. */
+/* For each knob from exact to fast, passing through the default. */
 static const speed_step steps[] = {
     {KNOB_PRESET, "exact", 0, GBT_PRESET_EXACT},
     {KNOB_PRESET, "default", 0, GBT_PRESET_DEFAULT},
@@ -53,7 +53,7 @@ static const speed_step steps[] = {
     {KNOB_RENDERER, "EWA splats", 0, RASTER_EWA},
 };
 
-/* Splats are drawn by still pinholes alone: of the photos that are compared, too. */
+/* Whether splats can be drawn: only by pinholes at rest, and the compared photos need such cameras too. */
 static bool takes_splats(const bench_scene *s)
 {
     bool takes = raster_takes(&s->camera.shot.camera);
@@ -116,7 +116,7 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
     row->error = bench_reference_compare(want, &way->rgb);
 }
 
-/* The default once, however many knobs go through it. */
+/* Measure all rows; the default only once, although every knob has a row for it. */
 static gbt_status measure_rows(const bench_scene *s, const bench_reference *want, int repeats,
                                speed_model *out, gbt_error *err)
 {
@@ -176,7 +176,7 @@ static gbt_status measure_path(const char *path, const char *camera, int repeats
     return status;
 }
 
-/* ---- all of them ---- */
+/* ---- all models ---- */
 
 lab_study_def lab_study_def_default(void) { return (lab_study_def){.repeats = 3}; }
 

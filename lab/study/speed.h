@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/speed.h -- the measurements of the study "speed against accuracy", and how they are written down. */
+/* study/speed.h -- the study "speed", speed against accuracy: what is measured, and its output. */
 #ifndef GBT_STUDY_SPEED_H
 #define GBT_STUDY_SPEED_H
 
@@ -21,21 +21,21 @@ typedef enum speed_knob {
     KNOB_COUNT
 } speed_knob;
 
-/** A setting that was measured. */
+/** One measured setting. */
 typedef struct speed_row {
     speed_knob knob;
     const char *value; /* "0.01", "embree" */
-    bool is_default;   /* the same as the preset "default": its figures are those */
+    bool is_default;   /* equal to the preset "default", whose figures it shares */
     trace_settings settings;
     trace_kernel kernel;
     cpu_isa isa;
-    bool splats; /* in place of rays, in this form */
+    bool splats; /* drawn by splats of this form instead of rays */
     raster_form form;
-    double picture_us;          /* core-microseconds per pixel: tree and forward */
-    double forward_us, both_us; /* forward; forward and adjoint */
-    double photo_psnr;          /* mean over the held-out photos of a run; NaN without them */
-    double blended, pairs;      /* per ray; pairs of rows per packet */
-    bench_error error;          /* to the picture without cut-offs */
+    double picture_us;          /* core-microseconds per pixel: tree build and forward pass */
+    double forward_us, both_us; /* forward pass; forward and adjoint */
+    double photo_psnr;          /* mean over the held-out photos of a run; NaN without any */
+    double blended, pairs;      /* blended: per ray; pairs: pairs of rows per packet */
+    bench_error error;          /* against the picture without cut-offs */
 } speed_row;
 
 typedef struct speed_model {
@@ -52,11 +52,12 @@ typedef struct speed_study {
     int repeats, threads;
 } speed_study;
 
-/** PSNR of every row to the held-out photos of `s`, which is decoded anew; row->photo_psnr and photo_count,
-    without photos that are masked whole. Nothing for a .ply. */
+/** Measure the PSNR of every row against the held-out photos of `s`, which is decoded again for each: sets
+    row->photo_psnr and photo_count. Photos that are masked completely are left out. Does nothing for a .ply.
+    */
 gbt_status speed_measure_photos(struct bench_scene *s, speed_model *out, gbt_error *err);
 
-/** How it is written down. */
+/** The files that the study writes. */
 extern const study_output speed_output;
 
 #endif

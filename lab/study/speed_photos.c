@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/speed_photos.c -- how close each setting of the study "speed" comes to the photos that were held
-   out. */
+/* study/speed_photos.c -- how well the pictures of each setting of the study "speed" match the held-out
+   photos. */
 #include <math.h>
 #include <string.h>
 
@@ -9,7 +9,7 @@
 #include "image/metrics.h"
 #include "study/speed.h"
 
-/* What one row makes of the view that `s` holds, with its near distance. */
+/* Draw the current view of `s`, which has its own near distance, with the settings of a row. */
 static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *traced,
                        raster_scene *splatted, image *rgb, gbt_error *err)
 {
@@ -24,13 +24,13 @@ static gbt_status draw(const bench_scene *s, const speed_row *row, trace_scene *
                           &s->camera.shot.camera, &splat, false, rgb, NULL, NULL, err);
 }
 
-/* Other kernels and instruction sets give the picture of the default. */
+/* Whether a row needs a picture of its own: other kernels and instruction sets give the default's picture. */
 static bool is_own_picture(const speed_row *row)
 {
     return !row->is_default && row->knob != KNOB_KERNEL && row->knob != KNOB_ISA;
 }
 
-/* As gbtrace eval scores it. A photo that is masked whole counts for no row. */
+/* Score a view as gbtrace eval does. A photo that is masked completely is skipped for all rows. */
 static gbt_status score_view(bench_scene *s, size_t view, speed_model *out, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&s->run.photos, view, 0);

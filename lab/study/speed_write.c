@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/speed_write.c -- the study "speed against accuracy" as a table, as data, and as a chart. */
+/* study/speed_write.c -- the study "speed" as a table, JSON and a chart. */
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -84,7 +84,7 @@ static json_t *data_of(const void *of)
 
 /* ---- chart ---- */
 
-/* Panels of a model: to the picture without cut-offs; of a run also to the photos. */
+/* Panels per model: error to the picture without cut-offs; for a run also to the photos. */
 static size_t panel_count(const speed_model *model) { return model->photo_count > 0 ? 2 : 1; }
 
 static void draw_panel(const speed_study *study, size_t m, bool photos, int top, text *out)

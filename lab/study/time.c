@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/time.c -- the study "time": make its runs. */
+/* study/time.c -- the study "time": held-out PSNR against training time. Makes the runs. */
 #include "study/time.h"
 
 #include "base/fail.h"
@@ -16,7 +16,7 @@ static gbt_status run_one(const void *study, size_t of_data, size_t variant, int
     def.downscale = s->def.downscale;
     def.seed = (uint64_t)seed;
     def.save_every_seconds = 0;
-    def.find_exposure = false; /* the faithful protocol has none, and scores must be of the same pixels */
+    def.find_exposure = false; /* the faithful protocol has none, and scores must be over the same pixels */
     def.command = "gbtrace study time";
     def.budget_seconds = v->budgets * s->def.budget_seconds;
     for (int i = 0; i < TIME_MARKS; i++)
@@ -25,7 +25,7 @@ static gbt_status run_one(const void *study, size_t of_data, size_t variant, int
                                  def, out, err);
 }
 
-/* The faithful protocol is splatted. */
+/* The faithful protocol trains with splats, which need pinholes. */
 static gbt_status want_pinholes(const char *data, gbt_error *err)
 {
     scene s;

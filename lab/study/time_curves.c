@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/time_curves.c -- what the curves of the study "time" say: scores, marks on the way, and the time to a
- * score. */
+/* study/time_curves.c -- statistics of the study "time": scores, intermediate scores, and the time to reach a
+   score. */
 #include "study/time.h"
 
 #include <math.h>
@@ -59,7 +59,7 @@ stat_sample time_saved(const grid_study *s, size_t scene)
         values[seed] = time_to_reach(study_grid_at(&s->grid, scene, TIME_DEFAULT, seed),
                                      study_grid_at(&s->grid, scene, TIME_FAITHFUL, seed)->psnr);
         if (!isfinite(values[seed]))
-            return stat_of(NULL, 0); /* a mean without the slow ones would flatter */
+            return stat_of(NULL, 0); /* a mean without the slowest runs would be too good */
     }
     return stat_of(values, (size_t)s->grid.seeds);
 }

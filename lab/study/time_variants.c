@@ -2,9 +2,10 @@
 /* study/time_variants.c -- the runs that the study "time" compares: THE table to edit. */
 #include "study/time.h"
 
-/* One row per run: its name, what differs from the default settings (keys as `gbtrace train` writes them to
-   RUN/config, one a line), and how many budgets it gets. The first two rows have their places; any others may
-   come and go. A new meaning needs a new name: the name is the folder of the runs. */
+/* One row per run: its name, its differences from the default settings (one per line, with the keys that
+   `gbtrace train` writes to RUN/config), and its training time in budgets. The first two rows are fixed; any
+   others may be added or removed. If a row changes its meaning it needs a new name, because the name is the
+   folder of its runs. */
 const time_variant time_variants[] = {
     {"default", "", 1},
     {"faithful protocol, splats", "compat = 1\nrenderer = raster", 5},

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* study/time_write.c -- the study "time" as tables, as data, and as charts. */
+/* study/time_write.c -- the study "time" as tables, JSON and charts. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -160,7 +160,8 @@ static json_t *data_of(const void *study)
 
 /* ---- charts ---- */
 
-/* Two curves, the ends of all others, and the height that the faithful protocol comes to. */
+/* The curves of the first two variants, the end points of all others, and a line at the final PSNR of the
+   faithful protocol. */
 static void draw_scene(const grid_study *s, size_t scene, int top, text *out)
 {
     scatter_point points[2 * (TIME_MARKS + 1) + TIME_VARIANTS_MAX];

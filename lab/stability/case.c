@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/case.c -- which cases the study "stability" has, and one of them from its scene file to its rows.
+/* stability/case.c -- the cases of the study "stability", and how one runs: from its scene file to its rows.
  */
 #include <stdio.h>
 #include <string.h>
@@ -22,7 +22,7 @@ static const stability_case cases[] = {
 };
 enum { CASE_COUNT = sizeof cases / sizeof *cases };
 
-/* Whether a comma-separated list holds a name; *known counts how many of its entries do. */
+/* Whether a comma-separated list contains a name. *known counts the entries that are names of cases. */
 static bool is_listed(const char *list, const char *name)
 {
     const size_t length = strlen(name);

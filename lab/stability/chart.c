@@ -6,7 +6,7 @@
 #include "report/plot.h"
 #include "stability/stability.h"
 
-/* A panel in its own units. */
+/* Sizes of a panel, in its own units. */
 enum {
     WIDTH = 430,
     HEIGHT = 316,
@@ -24,7 +24,7 @@ static const char css[] = ".plot text{font-size:11px}\n"
                           ".plot .dot{fill:var(--k)}\n"
                           ".plot .key{fill:var(--k);font-weight:600}\n";
 
-/* Classes of report/plot.h by series: ours, the rasterizer, others. */
+/* Style classes of report/plot.h for the series: ours, the rasterizer, others. */
 static const int colors[STABILITY_SERIES] = {1, 2, 4, 3};
 
 static bool find_plot(const stability_chart *c, plot *p)
@@ -40,7 +40,7 @@ static bool find_plot(const stability_chart *c, plot *p)
         for (size_t i = 0; i < c->series[k].count; i++)
             plot_take(p, c->series[k].x[i], c->series[k].y[i]);
     if (!c->log_y && p->y.low > 0 && p->y.low < 0.4 * p->y.high)
-        p->y.low = 0; /* from zero where that costs little room */
+        p->y.low = 0; /* start at zero if that costs little space */
     return plot_close(p);
 }
 
@@ -61,7 +61,7 @@ static void draw_series(text *out, const stability_chart *c, int k, const plot *
                         colors[k], plot_x(p, line->x[i]), plot_y(p, line->y[i]), line->x[i], line->y[i]);
 }
 
-/* The names of the curves in their colours, in one row. */
+/* A legend in one row: the names of the curves, in their colours. */
 static void draw_keys(text *out, const stability_chart *c)
 {
     double at = 10;
@@ -71,11 +71,11 @@ static void draw_keys(text *out, const stability_chart *c)
         text_format(out, "<text class=\"key s%d\" x=\"%.1f\" y=\"%d\">", colors[k], at, TOP - 28);
         text_escaped(out, c->series[k].name);
         text_add(out, "</text>");
-        at += 6.4 * (double)strlen(c->series[k].name) + 14; /* about the width of its letters */
+        at += 6.4 * (double)strlen(c->series[k].name) + 14; /* approximate width of the name */
     }
 }
 
-/* One line, or two broken between words. */
+/* The note in one line, or in two, broken between words. */
 static void draw_note(text *out, const char *note)
 {
     char lines[2][NOTE_LETTERS + 1] = {"", ""};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/crowd.c -- a scene where much overlaps, and the rays of it on which a last bit may show. */
+/* stability/crowd.c -- a scene with many overlapping Gaussians, and the rays on which rounding may be
+   visible. */
 #include "stability/crowd.h"
 
 #include <math.h>
@@ -42,7 +43,7 @@ size_t stability_find_edges(stability *s, const gaussians *g, const float *dirs,
     reference_scene exact = {0};
     reference_hit *hits = NULL;
     size_t count = 0, capacity = 0, edges = 0;
-    settings.alpha_min *= 0.99999f; /* those just below count here too */
+    settings.alpha_min *= 0.99999f; /* also find those just below the cut-off */
     stability_ok(s, reference_scene_make(g, &exact, s->err));
     for (size_t i = 0; i < ray_count && s->status == GBT_OK; i++) {
         const double origin[3] = {0, 0, 0},

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/crowd.h -- a scene where much overlaps, and the rays of it on which a last bit may show. */
+/* stability/crowd.h -- a scene with many overlapping Gaussians, and the rays on which rounding may be
+   visible. */
 #ifndef GBT_STABILITY_CROWD_H
 #define GBT_STABILITY_CROWD_H
 
 #include "stability/draw.h"
 
-/** The Gaussians of the scene file, then as many as its number "more_gaussians" says, random ones of "seed"
-    in front of the origin. */
+/** The Gaussians of the scene file, followed by "more_gaussians" random ones in front of the origin (seed:
+    "seed"). */
 void stability_crowd(stability *s, gaussians *g);
 
 /**
- * Rays from the origin on which two depths agree to 2e-6, or an alpha or T lies within 1e-5 of its cut: there
- * a picture has an edge.
+ * Find the rays from the origin on which rounding may change the picture visibly: two depths agree to 2e-6,
+ * or an alpha or T is within 1e-5 of its cut-off.
  *
  * @param dirs    [in]  [ray_count][3]
  * @param on_edge [out] [ray_count]

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/gradient.c -- the tracer's gradient against differences in double. */
+/* stability/gradient.c -- compare the tracer's gradient with finite differences in double. */
 #include "stability/gradient.h"
 
 #include <math.h>
@@ -24,7 +24,7 @@ static double sum_picture(stability *s, differences *d)
     return sum;
 }
 
-/* Central difference by one field of one Gaussian. */
+/* Central difference with respect to one field of one Gaussian. */
 static double difference_by(stability *s, differences *d, size_t field, size_t i)
 {
     static const double step = 1e-6;
@@ -38,7 +38,7 @@ static double difference_by(stability *s, differences *d, size_t field, size_t i
     return (above - below) / (2 * step);
 }
 
-/* The part of a quaternion's gradient that is tangent to it. */
+/* Project a quaternion's gradient onto the tangent space of the unit sphere. */
 static void make_tangent(const reference_scene *scene, size_t i, double d[GAUSSIANS_FIELD_COUNT])
 {
     double along = 0;

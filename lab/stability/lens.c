@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/lens.c -- cases of the study "stability" about cameras: wide angles, and rows that are read one
-   after the other. */
+/* stability/lens.c -- cases of the study "stability" about cameras: wide angles (A10) and rolling shutter
+   (A11). */
 #include <math.h>
 #include <string.h>
 
@@ -14,7 +14,7 @@ static const double degree = 0.017453292519943295;
 
 /* ---- A10: wide angles ---- */
 
-/* Cut-offs so low that a ray within rounding of one shows nothing of it. */
+/* Settings with cut-offs so low that it is invisible on which side of one a response falls. */
 static trace_settings without_edges(const stability *s)
 {
     trace_settings settings = trace_settings_default();
@@ -40,15 +40,15 @@ static void all_around(stability *s, size_t count, gaussians *g)
     }
 }
 
-/* Turn a camera to face `number` of a cube. */
+/* Rotate a camera to look through face `number` of a cube. */
 static void face_cube(gbt_camera *camera, int number)
 {
     draw_turned(number < 4 ? number * 90 * degree : 0, number < 4 ? 0 : (number == 4 ? 90 : -90) * degree,
                 camera->rotation);
 }
 
-/* The rays of a pinhole's pixels as another camera has them: where that camera sees the direction, it is
-   asked for its ray. */
+/* For each ray of a pinhole's picture, the ray that another camera has for the same direction, if it sees
+   that direction. */
 static size_t rays_of_other(const ray_image *face, const gbt_camera *other, double angle_max, ray_image *out)
 {
     size_t seen = 0;
@@ -98,7 +98,7 @@ static double compare_faces(stability *s, const gaussians *g, const gbt_camera *
     return most;
 }
 
-/* One round Gaussian off the axis: largest error of alpha over a picture around it, by both renderers. */
+/* One round Gaussian off the axis: largest error of alpha in a picture around it, for both renderers. */
 static void off_axis(stability *s, double distance, double angle, drawing *ours, drawing *theirs,
                      double error[2])
 {
@@ -109,7 +109,7 @@ static void off_axis(stability *s, double distance, double angle, drawing *ours,
     const double focal = stability_number(s, "focal");
     const trace_settings settings = without_edges(s);
     raster_settings splat = raster_settings_default();
-    /* what is left is the projection */
+    /* so that only the error of the projection remains */
     splat.alpha_min = settings.alpha_min;
     splat.dilation = 0;
     splat.exact_cut = true;
@@ -182,9 +182,9 @@ gbt_status stability_a10(stability *s)
     return s->status;
 }
 
-/* ---- A11: rows read one after the other ---- */
+/* ---- A11: rolling shutter ---- */
 
-/* Where the post stands in row y: the mean column, weighted by what it shows. */
+/* Column of the post in row y: the mean column, weighted by brightness. */
 static double post_in_row(const image *rgb, int y)
 {
     double sum = 0, weighted = 0;
@@ -193,10 +193,10 @@ static double post_in_row(const image *rgb, int y)
         sum += value;
         weighted += value * (x + 0.5);
     }
-    return weighted / sum; /* NaN, which fails, where it is not seen */
+    return weighted / sum; /* NaN, which fails, if the post is not visible in this row */
 }
 
-/* Largest distance of the post from where it should be. */
+/* Largest distance, over all rows, of the post from its analytic position. */
 static double post_error(const image *rgb, double x0, double skew, stability_chart *chart, int series)
 {
     double most = 0;
@@ -239,7 +239,8 @@ gbt_status stability_a11(stability *s)
         changed += memcmp(&ours.rgb.pixels[i], &still.rgb.pixels[i], sizeof(float)) != 0;
     const double apart =
         s->status == GBT_OK ? draw_difference(ours.rgb.pixels, still.rgb.pixels, 3 * WIDTH * HEIGHT) : 0;
-    /* From the middle of the first row to that of the last; the camera was given for the first. */
+    /* `readout` is the time from the middle of the first row to the middle of the last, while `motion` is
+     * from edge to edge; `camera` has the pose of the first row, while a shot has that of the middle. */
     shot.camera.motion[0] = speed * readout * HEIGHT / (HEIGHT - 1.0);
     shot.camera.center[0] += 0.5 * speed * readout;
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_shot(&shot, 0, &rays, s->err)))

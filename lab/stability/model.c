@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/model.c -- 3DGS files made in memory and read back. */
+/* stability/model.c -- write a 3DGS file in memory and read it back. */
 #include "stability/model.h"
 
 #include <stdio.h>

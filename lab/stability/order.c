@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/order.c -- cases of the study "stability" about order: ties, and very many hits. */
+/* stability/order.c -- cases of the study "stability" about blending order: ties (A4), and very many hits
+   (A6). */
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 
 /* ---- A4: Gaussians in one place ---- */
 
-/* What a stack of n copies lets through and shows, with the same cut-offs. */
+/* Transmittance and colour of a stack of n copies in closed form, with the same cut-offs. */
 static void stack_exact(double alpha, size_t n, double stop, double *T, double *red, double *blue)
 {
     *T = 1;
@@ -61,7 +62,8 @@ static void stacks(stability *s)
     const raster_settings splat = raster_settings_default();
     const gbt_camera camera = draw_pinhole(SIZE, SIZE, 100, here);
     drawing ours = {0}, theirs = {0};
-    trace_scene timed = {.kernel = TRACE_TREE}; /* which builds a tree; lists are made with the first rays */
+    trace_scene timed = {.kernel = TRACE_TREE}; /* it builds a tree now; lists would be built only with the
+                                                   first rays */
     ray_image rays = {0};
     gaussians g = {0};
     stack_errors e = {0}, r = {0};
@@ -101,7 +103,7 @@ static void stacks(stability *s)
     gaussians_free(&g);
 }
 
-/* The same Gaussians stored in another order. */
+/* Store the same Gaussians in another order. */
 static void shuffle(stability *s, const gaussians *g, gaussians *out)
 {
     if (s->status != GBT_OK || !stability_ok(s, gaussians_copy(g, out, s->err)))
@@ -115,8 +117,8 @@ static void shuffle(stability *s, const gaussians *g, gaussians *out)
     }
 }
 
-/* Two pictures of the same Gaussians: values whose bits differ, and by how much at most; but for rays on
-   edges. */
+/* Compare two pictures of the same Gaussians, except for rays on edges: the number of values whose bits
+   differ, and the largest difference. */
 static size_t bits_changed(const stability *s, const drawing d[2], const bool *on_edge, double *most)
 {
     const size_t values = 3 * (size_t)d[0].rgb.width * (size_t)d[0].rgb.height;
@@ -197,7 +199,7 @@ static void concentric(stability *s, size_t count, double opacity, gaussians *g)
     }
 }
 
-/* Processor seconds of one picture, the least of five. */
+/* CPU seconds for one picture, minimum of five. */
 static double time_picture(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
                            const ray_image *rays)
 {
@@ -215,8 +217,8 @@ gbt_status stability_a6(stability *s)
     static const double here[3] = {0, 0, 0};
     static const trace_kernel kernels[] = {TRACE_LIST, TRACE_TREE, TRACE_SINGLE, TRACE_EMBREE};
     const size_t count = (size_t)stability_number(s, "gaussians");
-    const gbt_camera camera =
-        draw_pinhole(8, 8, 60, here); /* slopes below 0.085: every ray is well inside every Gaussian */
+    const gbt_camera camera = draw_pinhole(8, 8, 60, here); /* slopes below 0.085, so that every ray is well
+                                                               inside of every Gaussian */
     trace_settings settings = trace_settings_default();
     gaussians g = {0};
     ray_image rays = {0};

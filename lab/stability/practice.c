@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/practice.c -- data sets of known Gaussians on disk, and runs on them. */
+/* stability/practice.c -- write small data sets made of known Gaussians, and train on them. */
 #include "stability/practice.h"
 
 #include <ftw.h>
@@ -17,7 +17,7 @@ static const double degree = 0.017453292519943295;
 
 /* ---- the scene ---- */
 
-/* Evenly spread (Fibonacci), coloured in smooth bands: something to learn from every side. */
+/* Gaussian i of a Fibonacci sphere, coloured in smooth bands, so that every side has something to learn. */
 static void put_gaussian(practice *p, size_t i, size_t count)
 {
     const double z = 1 - (2 * (double)i + 1) / (double)count, turn = 2.399963229728653 * (double)i,
@@ -85,7 +85,7 @@ void practice_free(practice *p)
     mem_free(p);
 }
 
-/* ---- on disk ---- */
+/* ---- files ---- */
 
 static void write_photo(stability *s, const practice *p, size_t i, drawing *d, ray_image *rays)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/scene.c -- the scene files of the study "stability", and what its cases read from them and
-   report. */
+/* stability/scene.c -- read the scene files of the study "stability", and collect the results of the cases.
+ */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/shape.c -- cases of the study "stability" about shape and place: needles, a camera inside, far
-   from the origin. */
+/* stability/shape.c -- cases of the study "stability" about shape and place: needles (A2), a camera inside a
+   Gaussian (A3), a scene far from the origin (A5). */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@
 #include "stability/gradient.h"
 #include "stability/model.h"
 
-/* The tracer's and the rasterizer's alpha of the one Gaussian there is. */
+/* Alpha of the only Gaussian, by the tracer and by the rasterizer. */
 static double alpha_at(const stability *s, const drawing *d, size_t pixel)
 {
     return s->status == GBT_OK ? 1 - (double)d->transmittance[pixel] : 0;
@@ -34,7 +34,8 @@ typedef struct needles {
     size_t bad; /* not finite, or outside [0, opacity] */
 } needles;
 
-/* Needle `i`, and a ray through a random point of its ellipsoid of radius 1. */
+/* Place needle `i`, and return a random point of its one-sigma ellipsoid in `through`, for a ray to go
+   through. */
 static void place_needle(needles *n, size_t i, const double scale[3], double opacity, double through[3])
 {
     static const double white[3] = {1, 1, 1};
@@ -77,7 +78,7 @@ static double percentile_95(float *values, size_t count)
     return (double)values[count * 95 / 100 < count ? count * 95 / 100 : count - 1];
 }
 
-/* `count` needles (or pancakes) of ratio r; 0 thin axes for r = infinity. */
+/* Errors of alpha for `count` needles (or pancakes) of ratio r; for r = infinity the thin axes are 0. */
 static void measure_ratio(stability *s, needles *n, bool pancake, double r, size_t count, double error[2])
 {
     const double opacity = (double)(float)stability_number(s, "opacity");
@@ -91,7 +92,7 @@ static void measure_ratio(stability *s, needles *n, bool pancake, double r, size
     error[1] = percentile_95(n->raster_error, count);
 }
 
-/* A file of needles: what the reader makes of their ratio. */
+/* Load a file of needles: the largest ratio that the reader leaves. */
 static void load_needles(stability *s, double r)
 {
     enum { ROWS = 200 };
@@ -111,7 +112,7 @@ static void load_needles(stability *s, double r)
     gaussian_cloud_free(&cloud);
 }
 
-/* Many needles of the largest ratio in one tree: a SAH builder must not lose them. */
+/* Many needles of the largest ratio in one tree, where a SAH builder could lose some. */
 static void build_needles(stability *s, double r)
 {
     const trace_settings settings = trace_settings_default();
@@ -180,7 +181,7 @@ gbt_status stability_a2(stability *s)
 
 /* ---- A3: the camera inside a Gaussian ---- */
 
-/* alpha on the way of a camera from z = -1 to 1, looking along z, `count` steps. */
+/* Alpha while a camera moves from z = -1 to 1, looking along z, in `count` steps. */
 static void walk_through(stability *s, drawing *d, const gaussians *g, const trace_settings *settings,
                          size_t count, double *alpha)
 {
@@ -206,7 +207,7 @@ static double largest_step(const double *values, size_t count)
     return most;
 }
 
-/* The rasterizer's walk, in coarser steps: its largest step. */
+/* The rasterizer on the same way, in coarser steps: largest change in one step. */
 static double splat_through(stability *s, drawing *d, const gaussians *g, size_t count,
                             stability_chart *chart)
 {
@@ -226,7 +227,7 @@ static double splat_through(stability *s, drawing *d, const gaussians *g, size_t
     return most;
 }
 
-/* Poses with an answer known by hand: origin, direction, alpha. */
+/* Poses for which alpha can be computed by hand: origin, direction, alpha. */
 static double known_poses(stability *s, drawing *d, const gaussians *g, const trace_settings *settings)
 {
     double poses[70], most = 0;
@@ -242,7 +243,7 @@ static double known_poses(stability *s, drawing *d, const gaussians *g, const tr
     return most;
 }
 
-/* The gradient where the response is inside the ray, and where it is cut at t_near. */
+/* The gradient where the peak of the response is on the ray, and where it is cut off at t_near. */
 static double gradient_on_both_sides(stability *s, const gaussians *g, const trace_settings *settings)
 {
     gaussians d_gaussians = {0};
@@ -310,9 +311,9 @@ gbt_status stability_a3(stability *s)
 /* ---- A5: far from the origin ---- */
 
 typedef struct far_scene {
-    gaussians local, moved; /* where the scene is at home; as float32 has it elsewhere */
-    double *exact;          /* the picture at home, in double */
-    gbt_camera camera;      /* at home */
+    gaussians local, moved; /* the scene near the origin; the same in float32 coordinates elsewhere */
+    double *exact;          /* picture of `local`, in double */
+    gbt_camera camera;      /* for `local` */
     ray_image rays;
     drawing d;
 } far_scene;
@@ -334,8 +335,8 @@ static void furnish(stability *s, far_scene *f)
     }
 }
 
-/* The float32 means of the scene, written into the world at `offset` in double, loaded as a data set, and
-   back at the loader's origin. */
+/* Write the scene's float32 means in double, moved by `offset`, load them as a data set, and put the loaded
+   positions, which are relative to the loader's origin, into f->moved. */
 static void load_far(stability *s, far_scene *f, double offset, double origin[3])
 {
     char path[4096];
@@ -367,7 +368,7 @@ static void load_far(stability *s, far_scene *f, double offset, double origin[3]
     scene_free(&loaded);
 }
 
-/* PSNR of the moved Gaussians, seen by the same camera standing at the same place among them. */
+/* PSNR of the moved Gaussians, seen by a camera that was moved with them. */
 static double psnr_at(stability *s, far_scene *f, const double shift[3])
 {
     const trace_settings settings = trace_settings_default();

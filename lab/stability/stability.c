@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/stability.c -- the study "stability" from its options to its files: measured, written,
-   printed. */
+/* stability/stability.c -- the study "stability": measure all cases, write the files, print the table. */
 #include "stability/stability.h"
 
 #include <math.h>
@@ -15,7 +14,7 @@
 
 /* ---- table ---- */
 
-/* Counts as they are, the rest with three digits. */
+/* Integers as they are, other numbers with three digits. */
 static void add_figure(text *out, double value)
 {
     if (isnan(value))
@@ -42,7 +41,7 @@ static void stability_table(const stability_study *study, text *out)
     }
 }
 
-/* What goes wrong elsewhere, what is done here, and what else is to be known of each row. */
+/* For each case: what goes wrong in other renderers, what is done here, and notes on its rows. */
 static void add_parts(const stability_study *study, text *out)
 {
     for (size_t p = 0; p < study->part_count; p++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/training.c -- cases of the study "stability" about training: views far from the photos, poor
-   sparse points. */
+/* stability/training.c -- cases of the study "stability" about training: views far from the photos (A12), and
+   poor sparse points or photos (A13). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -23,7 +23,7 @@ static gbt_train_def practice_def(stability *s)
     return def;
 }
 
-/* The case ends where a run that must go fails. */
+/* For runs that must succeed: a failure ends the case. */
 static bool must(stability *s, gbt_status status, const gbt_error *why)
 {
     if (status != GBT_OK && s->status == GBT_OK && s->err != NULL)
@@ -38,13 +38,13 @@ typedef struct far_views {
     trainer t;
     drawing truth, baked;
     ray_image rays;
-    gaussians fixed; /* what the networks make of the scene from the nearest photo */
+    gaussians fixed; /* the Gaussians that the networks decode for the nearest photo */
     size_t bad;
     double out_of_range;
 } far_views;
 
-/* The largest factor by which a distance that the networks saw is outside [min / 2, 2 max]; 0 when none
-   is. */
+/* By which factor the distances given to the networks exceed the range [min / 2, 2 max]: the largest such
+   factor, or 0 if none does. */
 static double beyond_range(const far_views *f)
 {
     const decoder *d = &f->t.decoder;
@@ -59,7 +59,8 @@ static double beyond_range(const far_views *f)
     return worst <= 1 + 1e-6 ? 0 : worst;
 }
 
-/* The share of anchors that are seen from outside the cone of directions in which the photos saw them. */
+/* The share of anchors whose viewing direction is outside the cone of directions from which the photos saw
+   them. */
 static double share_outside(const far_views *f, const double center[3])
 {
     size_t outside = 0;
@@ -95,7 +96,7 @@ static bool render_model(stability *s, far_views *f, const gbt_camera *camera)
                                         &local, &f->t.settings, false, s->err));
 }
 
-/* PSNR to the truth of the model minus that of the Gaussians it makes for the nearest photo. */
+/* PSNR, against the truth, of the model minus that of the Gaussians decoded for the nearest photo. */
 static double loss_to_baked(stability *s, far_views *f, double azimuth, double elevation, double radius,
                             double own_radius, double *outside)
 {
@@ -142,7 +143,7 @@ static void look_from_everywhere(stability *s, far_views *f)
                 elsewhere = larger_or_nan(elsewhere, loss);
             outside_most = larger_or_nan(outside_most, outside);
         }
-    /* On an anchor: direction and distance are not defined. */
+    /* A camera exactly on an anchor: direction and distance are undefined. */
     gbt_camera on = practice_camera(f->p, 0, 0, own);
     for (size_t k = 0; k < 3 && s->status == GBT_OK; k++)
         on.center[k] = (double)f->t.anchors.position[k] + f->t.scene.origin[k];
@@ -242,7 +243,7 @@ static void p7_outliers(practice *p)
             p->point[i][k] *= 1e5;
 }
 
-static void p8_behind(practice *p) /* the cameras stand at z < 0 and look to z > 0 */
+static void p8_behind(practice *p) /* the cameras stand at z < 0 and look towards +z */
 {
     for (size_t i = 0; i < p->point_count; i++)
         p->point[i][2] -= 40;
@@ -270,7 +271,7 @@ static void p15_no_color(practice *p) { memset(p->color, 0, sizeof p->color); }
 typedef struct poor_case {
     const char *row;
     void (*spoil)(practice *p);
-    bool may_refuse, absolute; /* absolute: the PSNR itself, not what it is above one colour */
+    bool may_refuse, absolute; /* absolute: judge the PSNR itself, not its gain over a uniform colour */
 } poor_case;
 
 static const poor_case poor_cases[] = {
@@ -338,7 +339,7 @@ static void exposures_differ(stability *s)
     static const float factors[3] = {0.5f, 1, 2};
     practice *p = poor_scene(s, 12);
     for (size_t i = 0; p != NULL && i < p->view_count; i++)
-        p->gain[i] = 0.5f * factors[i % 3]; /* half as bright: twice that does not clip */
+        p->gain[i] = 0.5f * factors[i % 3]; /* half as bright, so that twice that does not clip */
     practice_write(s, p, "a13p11");
     const double without = held_out(s, p, false), with = held_out(s, p, true);
     stability_check(s, "A13P11", with - without, NAN,

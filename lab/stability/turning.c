@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/turning.c -- case A1 of the study "stability": what changes when only the camera turns. */
+/* stability/turning.c -- case A1 of the study "stability": what changes when only the direction of the camera
+   changes. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 static const double degree = 0.017453292519943295;
 
 typedef struct placed_ray {
-    uint64_t place; /* where the camera of a pose sees it: tile, then pixel */
+    uint64_t place; /* pixel in which the camera of a pose sees the ray: tile, then pixel in it */
     uint32_t id;
 } placed_ray;
 
@@ -23,7 +24,7 @@ static int by_place(const void *a, const void *b)
                                 : (p->id > q->id) - (p->id < q->id);
 }
 
-/* The order in which the tiles of a panorama of this pose would take the rays. */
+/* Sort the rays in the order in which the tiles of a panorama of this pose would contain them. */
 static void place_rays(const float *dirs, size_t count, double yaw, double pitch, placed_ray *out)
 {
     gbt_camera camera = {
@@ -44,12 +45,13 @@ static void place_rays(const float *dirs, size_t count, double yaw, double pitch
 
 typedef struct turning {
     size_t count;
-    bool *on_edge;                /* [count]: within rounding of a tie or a cut, where a last bit shows */
-    float *dirs, *first, *turned; /* [count][3]: the rays, their colours in the first pose and in this one */
+    bool *on_edge; /* [count]: within rounding of a tie or cut-off, where the last bit can be visible */
+    float *dirs, *first,
+        *turned; /* [count][3]: the rays, their colours in the first pose, and in the current pose */
     placed_ray *order;
 } turning;
 
-/* Colours of the rays as tiles of one pose, put back into their own order. */
+/* Trace the rays in the order of one pose's tiles, and put the colours back into the original order. */
 static void trace_pose(stability *s, const turning *t, drawing *d, const gaussians *g, ray_image *rays,
                        double yaw, double pitch, float *out)
 {
@@ -122,7 +124,7 @@ static void same_rays(stability *s)
     gaussians_free(&g);
 }
 
-/* A picture at a direction of the world, between pixels; false outside. */
+/* The colour of a picture in a world direction, by bilinear interpolation; false outside of the picture. */
 static bool look_up(const image *rgb, const gbt_camera *camera, const double dir[3], double out[3])
 {
     double cam[3], pixel[2];
@@ -147,14 +149,15 @@ static bool look_up(const image *rgb, const gbt_camera *camera, const double dir
 
 enum { LOOK_ACROSS = 41, LOOK_DOWN = 25, LOOK_COUNT = LOOK_ACROSS * LOOK_DOWN };
 
-static void look_direction(int i, double dir[3]) /* within 16 and 10 degrees: in sight from every pose */
+static void look_direction(int i, double dir[3]) /* within 16 and 10 degrees of the axis, so that every pose
+                                                    sees it */
 {
     dir[0] = tan(0.8 * (i % LOOK_ACROSS - LOOK_ACROSS / 2) * degree),
     dir[1] = tan(0.8 * (i / LOOK_ACROSS - LOOK_DOWN / 2) * degree), dir[2] = 1;
 }
 
-/* Directions within a pixel of a place where the exact picture itself has an edge: moving pixels across it is
-   no popping. */
+/* Find the directions without an edge of the exact picture within a pixel or so. Pixels that move across an
+   edge change, but that is not popping. */
 static size_t find_still(stability *s, const gaussians *g, double pixel, bool still[LOOK_COUNT])
 {
     static const double here[3] = {0, 0, 0}, around[5][2] = {{0, 0}, {-1, 0}, {1, 0}, {0, -1}, {0, 1}};
@@ -182,7 +185,7 @@ static size_t find_still(stability *s, const gaussians *g, double pixel, bool st
     return count;
 }
 
-/* What one renderer shows in fixed directions while its camera turns. */
+/* One renderer's colours in fixed directions while its camera turns. */
 typedef struct onlooker {
     drawing d;
     double last[LOOK_COUNT][3], jump;
@@ -200,13 +203,14 @@ static void look_around(onlooker *o, const gbt_camera *camera, const bool still[
                 o->jump = larger_or_nan(o->jump, fabs(now[c] - o->last[i][c]));
             o->last[i][c] = now[c];
         }
-        if (i == LOOK_COUNT / 2 + 5) /* 4 degrees aside */
+        if (i == LOOK_COUNT / 2 + 5) /* 4 degrees off the axis */
             memcpy(aside, now, sizeof now);
     }
     o->has_last = true;
 }
 
-/* Two small pictures, a hair's turn apart, by each renderer: the tracer's above. */
+/* Two small pictures in slightly different directions by each renderer: the tracer's above, the rasterizer's
+   below. */
 static void turning_picture(stability *s, const gaussians *g, drawing *d, const gbt_camera *camera,
                             double step)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/values.c -- cases of the study "stability" about values: saturated stacks and their gradients,
-   numbers that are none. */
+/* stability/values.c -- cases of the study "stability" about values: saturated stacks and their gradients
+   (A7), and non-finite values (A8). */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,7 +24,7 @@ static void in_a_row(stability *s, size_t n, double opacity, gaussians *g)
     }
 }
 
-/* Everything but the gradient of the colours; of a saturated response it must be exactly 0. */
+/* Largest gradient of all fields except colours; for a response cut at alpha_max it must be exactly 0. */
 static double shape_gradient(const gaussians *d)
 {
     double most = 0;
@@ -55,7 +55,7 @@ static void measure_stack(stability *s, double opacity, size_t n, double slope,
         const gradient_error e = draw_gradient_error(s, &g, settings, &rays, &d);
         out->bad += e.bad;
         out->stacks++;
-        if (slope == 0 && opacity > (double)settings->alpha_max) /* every response is cut */
+        if (slope == 0 && opacity > (double)settings->alpha_max) /* every response is cut at alpha_max */
             out->inside = fmax(out->inside, s->status == GBT_OK ? shape_gradient(&d) : 0);
         out->relative = fmax(out->relative, e.relative);
     }
@@ -78,9 +78,8 @@ gbt_status stability_a7(stability *s)
             for (size_t k = 0; k < slope_count; k++)
                 for (size_t n = 1; n <= most && s->status == GBT_OK; n++) {
                     settings.transmittance_min = (float)stops[stop];
-                    if (slopes[k] != 0 || (float)opacities[o] != settings.alpha_max) /* on the edge of the cut
-                                                                                        there is no derivative
-                                                                                      */
+                    if (slopes[k] != 0 || (float)opacities[o] != settings.alpha_max) /* there is no derivative
+                                                                                        exactly at the cut */
                         measure_stack(s, opacities[o], n, slopes[k], &settings, &out);
                 }
     stability_check(s, "A7a", out.relative, NAN, "%zu stacks of 1 to %zu, T_min %g and %g.", out.stacks, most,
@@ -92,7 +91,7 @@ gbt_status stability_a7(stability *s)
     return s->status;
 }
 
-/* ---- A8: values that are none ---- */
+/* ---- A8: non-finite values ---- */
 
 static const float bad_values[] = {0.0f,   -0.0f, NAN,    INFINITY, -INFINITY,
                                    1e-45f, 1e38f, -1e38f, 100.0f,   -1000.0f};
@@ -128,7 +127,7 @@ static bool is_color(const char *field)
     return strcmp(field, "red") == 0 || strcmp(field, "green") == 0 || strcmp(field, "blue") == 0;
 }
 
-/* Picture and gradient of Gaussians of which one is poisoned. */
+/* Picture and gradient of Gaussians one of which has a bad value. */
 static void try_poison(stability *s, poisoning *p, const gaussians *g, const char *field, float value)
 {
     const trace_settings settings = trace_settings_default();
@@ -189,7 +188,8 @@ static void poison_arrays(stability *s, size_t count)
     gaussians_free(&g);
 }
 
-/* Rows of a file, one of them poisoned: every loaded value is finite, and a row that is gone is counted. */
+/* Rows of a file, one of them with a bad value: every loaded value must be finite, and dropped rows must be
+   counted. */
 static void poison_files(stability *s, size_t count)
 {
     enum { ROWS_MAX = 256 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* stability/zoom.c -- case A9 of the study "stability": Gaussians that are smaller than a pixel, and
-   larger. */
+/* stability/zoom.c -- case A9 of the study "stability": Gaussians much smaller and much larger than a pixel.
+ */
 #include <math.h>
 #include <string.h>
 
@@ -9,7 +9,7 @@
 #include "stability/draw.h"
 #include "trace/footprint.h"
 
-/* Ways to draw the same grid. */
+/* Ways to draw the grid of dots. */
 typedef enum zoom_way { ZOOM_FOOTPRINT, ZOOM_SPLAT, ZOOM_POINT, ZOOM_EXACT, ZOOM_WAYS } zoom_way;
 static const char *const way_names[ZOOM_WAYS] = {"gbtrace, footprint", "rasterizer (3DGS)",
                                                  "gbtrace, no filter", NULL};
@@ -18,7 +18,7 @@ typedef struct zoom {
     gaussians grid, widened;
     trace_settings settings;
     float variance; /* of the footprint, px^2 */
-    int samples;    /* per pixel and axis, of the exact picture */
+    int samples;    /* per pixel and axis, for the exact picture */
     drawing d;
     ray_image rays;
 } zoom;
@@ -37,7 +37,7 @@ static void lay_grid(stability *s, double spacing, gaussians *g)
     }
 }
 
-/* Box means of blocks of samples x samples pixels; one channel. */
+/* Average blocks of samples x samples pixels; one channel. */
 static void average_blocks(const image *rgb, int samples, double *out)
 {
     const int width = rgb->width / samples, height = rgb->height / samples;
@@ -48,7 +48,8 @@ static void average_blocks(const image *rgb, int samples, double *out)
                 (double)rgb->pixels[3 * ((size_t)y * (size_t)rgb->width + (size_t)x)] / (samples * samples);
 }
 
-/* Red of the grid at distance z by one way, [size][size]; the picture moved by (dx, dy) pixels. */
+/* Red channel of the grid at distance z, drawn in one way, [size][size], with the picture shifted by (dx, dy)
+   pixels. */
 static void draw_grid(stability *s, zoom *z, zoom_way way, double distance, int size, double dx, double dy,
                       double *out)
 {
@@ -81,7 +82,8 @@ static double mean_of(const double *values, size_t count)
     return sum / (double)count;
 }
 
-/* Brightness at every distance against the exact picture's: largest relative error of each way. */
+/* Compare the brightness at every distance with that of the exact picture: largest relative error of each
+   way. */
 static void compare_brightness(stability *s, zoom *z, stability_chart *chart, double worst[ZOOM_WAYS])
 {
     double distances[16];
@@ -106,8 +108,8 @@ static void compare_brightness(stability *s, zoom *z, stability_chart *chart, do
 
 enum { SHIFTS = 16 };
 
-/* Std-dev of a pixel over 16 shifts by parts of a pixel, RMS over the pixels. Where dots are closer than
-   pixels, it should be even. */
+/* Standard deviation of a pixel over 16 subpixel shifts, RMS over the pixels. If the dots are closer together
+   than pixels, the picture should be uniform. */
 static double flicker_of(stability *s, zoom *z, zoom_way way, double distance, int size, double *scratch)
 {
     const size_t pixels = (size_t)size * (size_t)size;

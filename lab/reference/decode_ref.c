@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* reference/decode_ref.c -- the decoder in double, written from the equations (Yang 2026, eqs 13-15) without
-   any regard for speed. */
+/* reference/decode_ref.c -- the decoder in double precision, written directly from the equations (Yang 2026,
+   eqs 13-15), without optimization. */
 #include "reference/decode_ref.h"
 
 #include <math.h>
@@ -15,9 +15,9 @@ enum {
     OUT_MAX = 11 * ANCHOR_MAX_OFFSETS
 };
 
-static const double limit = 30.0; /* of the arguments of exp and sigmoid, as in activations.h */
+static const double limit = 30.0; /* for the arguments of exp and sigmoid, as in activations.h */
 
-/* One anchor's values between input and output. Heads: opacity, shape, colour. */
+/* Intermediate values of the three networks of one anchor, in the order opacity, shape, colour. */
 typedef struct activations {
     double input[INPUT_MAX];
     double hidden[3][HIDDEN];
@@ -91,9 +91,9 @@ void decode_ref_free(decode_ref *r)
 
 static double cut(double x) { return fmin(fmax(x, -limit), limit); }
 
-static double slope(double x) /* of cut() */ { return x >= -limit && x <= limit ? 1.0 : 0.0; }
+static double slope(double x) /* derivative of cut() */ { return x >= -limit && x <= limit ? 1.0 : 0.0; }
 
-static const double scale_ratio = (double)1e-4f; /* the least scale, as part of the largest */
+static const double scale_ratio = (double)1e-4f; /* smallest scale relative to the largest */
 
 static size_t largest_of(const double scale[3])
 {
@@ -139,7 +139,7 @@ static void run_networks(const decode_ref *r, const double camera[3], size_t anc
     }
 }
 
-/* Raw quaternion to unit length; returns 1 / length, or 0 where the direction is undefined. */
+/* Normalize a quaternion. Returns 1 / length, or 0 if its direction is undefined. */
 static double unit_quaternion(const double raw[4], double q[4])
 {
     double square = 0;
@@ -177,7 +177,7 @@ void decode_ref_forward(const decode_ref *r, const double camera_center[3], cons
     }
 }
 
-/* Logit gradients of one anchor back through its three networks. */
+/* Propagate the logit gradients of one anchor back through its three networks. */
 static void networks_backward(const decode_ref *r, size_t anchor, const activations *act,
                               const double *d_logit, decode_ref *grad)
 {

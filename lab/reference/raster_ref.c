@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* reference/raster_ref.c -- splatting in double and without any cleverness. The equations are in the header.
- */
+/* reference/raster_ref.c -- splatting in double precision, without optimization. The equations are in the
+   header. */
 #include "reference/raster_ref.h"
 
 #include <math.h>
@@ -15,13 +15,13 @@
 enum { MEAN = 0, SCALE = 3, QUAT = 6, OPACITY = 10, COLOR = 11, TILE = 16, PIXEL_GRAIN = 64 };
 
 typedef struct lens {
-    double focal[2], principal[2], low[2], high[2]; /* principal: from the centre of the first pixel */
+    double focal[2], principal[2], low[2], high[2]; /* principal: from the first pixel's centre */
     double center[3];
 } lens;
 
 typedef struct flat {
     double t[3], point[2], kept[2], j[2][3], jw[2][3], sigma[3][3], conic[3]; /* conic: xx, xy, yy of C^-1 */
-    int box[4]; /* pixels: first and end across, first and end down */
+    int box[4]; /* first and end column, first and end row */
     size_t id;
 } flat;
 
@@ -45,7 +45,8 @@ static gbt_status read_lens(const gbt_camera *camera, lens *out, gbt_error *err)
         out->high[k] = (1.15 * side[k] - principal) / out->focal[k];
     }
     for (int k = 0; k < 3; k++)
-        out->center[k] = rounded_to_float(camera->center[k]); /* where the rays of the tracer start */
+        out->center[k] =
+            rounded_to_float(camera->center[k]); /* rounded, since rays of the tracer start there too */
     return GBT_OK;
 }
 
@@ -120,7 +121,7 @@ static bool flatten(const raster_reference *scene, const gbt_camera *camera, con
 static int by_depth_then_id(const void *a, const void *b)
 {
     const flat *p = a, *q = b;
-    const float dp = (float)p->t[2], dq = (float)q->t[2]; /* the sheet's key: the bits of a float */
+    const float dp = (float)p->t[2], dq = (float)q->t[2]; /* the rasterizer sorts by the bits of a float */
     if (dp != dq)
         return dp < dq ? -1 : 1;
     return p->id < q->id ? -1 : p->id > q->id;
@@ -141,7 +142,7 @@ static gbt_status flatten_all(const raster_reference *scene, const gbt_camera *c
     return GBT_OK;
 }
 
-/* Response before the cut at alpha_max; 0 where the Gaussian is not drawn. */
+/* Response before it is limited to alpha_max; 0 if the Gaussian is not drawn there. */
 static double response(const raster_reference *scene, const raster_settings *s, const flat *f, int x, int y)
 {
     if (x < f->box[0] || x >= f->box[1] || y < f->box[2] || y >= f->box[3])
@@ -154,7 +155,7 @@ static double response(const raster_reference *scene, const raster_settings *s, 
     return raw >= (double)s->alpha_min ? raw : 0;
 }
 
-/* What a pixel sees behind everything. */
+/* The background colour of a pixel. */
 static void look_behind(const gbt_camera *camera, const raster_settings *s, int x, int y, double behind[3])
 {
     double ray[3], world[3];
@@ -164,7 +165,7 @@ static void look_behind(const gbt_camera *camera, const raster_settings *s, int 
     sky_color_exact(&s->sky, s->background, world, behind);
 }
 
-/* Front to back. Returns how many Gaussians of the list were passed. */
+/* Blend front to back. Returns how many Gaussians of the list were visited. */
 static size_t blend(const raster_reference *scene, const raster_settings *s, const flat *all, size_t count,
                     int x, int y, const double behind[3], double rgb[3], double *T)
 {
@@ -227,7 +228,7 @@ gbt_status raster_reference_forward(const raster_reference *scene, const gbt_cam
     return status;
 }
 
-/* Chain from dL/dp of one Gaussian on one pixel to its fields, matrix by matrix. */
+/* Chain rule from dL/dp of one Gaussian on one pixel to its fields, matrix by matrix. */
 static void respond_backward(const raster_reference *scene, const gbt_camera *camera, const lens *l,
                              const flat *f, int x, int y, double d_p, double *d)
 {
@@ -270,7 +271,8 @@ static void respond_backward(const raster_reference *scene, const gbt_camera *ca
         d[(size_t)(MEAN + c) * n + i] += world[c];
         d[(size_t)(SCALE + c) * n + i] += 2 * s * along;
     }
-    /* Derivatives of the rotation matrix's entries, then what is not tangent to the unit sphere taken off. */
+    /* Derivatives of the entries of the rotation matrix, then projected onto the tangent space of the unit
+     * sphere. */
     const double w = q[0], u = q[1], v = q[2], t = q[3];
     double d_q[4] = {2 * (-t * d_r[1] + v * d_r[2] + t * d_r[3] - u * d_r[5] - v * d_r[6] + u * d_r[7]),
                      2 * (v * d_r[1] + t * d_r[2] + v * d_r[3] - 2 * u * d_r[4] - w * d_r[5] + t * d_r[6] +

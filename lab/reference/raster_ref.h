@@ -1,27 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* reference/raster_ref.h -- the EWA form in double, every Gaussian against every pixel, and its adjoint: what
-   raster.h is tested against (Kerbl 2023, eqs 5, 6).
+/* reference/raster_ref.h -- EWA splatting in double precision, every Gaussian on every pixel, and its
+   adjoint: the reference in tests of raster.h (Kerbl 2023, eqs 5, 6).
 
    Per Gaussian with mean mu, Sigma = R S^2 R^T, opacity o, and a camera (rotation W, centre c, focal lengths,
    principal point):
 
        t = W (mu - c), drawn when t_z > near      centre = (fx t_x / t_z + cx, fy t_y / t_z + cy)
        J = [fx / t_z, 0, -fx kx / t_z; 0, fy / t_z, -fy ky / t_z]
-       kx = t_x / t_z kept in the picture and 0.15 of its width on each side, [-cx - 0.15 width, 1.15 width -
-            cx] / fx with cx from the picture's edge; ky likewise
+       kx = t_x / t_z clamped to the picture plus 0.15 of its width on each side, [-cx - 0.15 width,
+            1.15 width - cx] / fx with cx from the picture's edge; ky likewise
        C = J W Sigma W^T J^T + dilation I      p = -1/2 d^T C^-1 d, d = centre - pixel
        alpha = min(alpha_max, o exp(p))
 
-   drawn in the tiles of 16 x 16 pixels that centre +- ceil(3 sqrt(largest eigenvalue of C)) touches (or
-   everywhere: exact_cut), where alpha >= alpha_min. Blended in the order of (t_z, index), stopped before T <
-   transmittance_min; the background last. */
+   It is drawn where alpha >= alpha_min, but only in the tiles of 16 x 16 pixels that overlap the square
+   centre +- ceil(3 sqrt(largest eigenvalue of C)) (with exact_cut: everywhere). Gaussians are blended in the
+   order of (t_z, index), stopping before T would fall below transmittance_min; the background comes last. */
 #ifndef GBT_REFERENCE_RASTER_REF_H
 #define GBT_REFERENCE_RASTER_REF_H
 
 #include "raster/raster.h"
 
 /**
- * Gaussians in double, so that differences can move them by less than a float can hold:
+ * Gaussians in double, so that finite differences can use steps below the resolution of a float:
  * [GAUSSIANS_FIELD_COUNT][count], fields in order.
  */
 typedef struct raster_reference {
@@ -33,7 +33,7 @@ typedef struct raster_reference {
 gbt_status raster_reference_make(const gaussians *g, raster_reference *out, gbt_error *err);
 
 /**
- * Colour of every `step`-th pixel of every `step`-th row, from the first.
+ * Colours of every `step`-th pixel of every `step`-th row, starting with the first.
  *
  * @param settings      [in]  of form RASTER_EWA
  * @param rgb           [out] [pixels][3], row by row, with the background; raster_reference_pixels() of them
@@ -49,7 +49,7 @@ gbt_status raster_reference_backward(const raster_reference *scene, const gbt_ca
                                      const raster_settings *settings, const double *d_rgb, double *d_fields,
                                      gbt_error *err);
 
-/** Pixels that raster_reference_forward() computes. */
+/** The number of pixels that raster_reference_forward() computes. */
 static inline size_t raster_reference_pixels(const gbt_camera *camera, int step)
 {
     return (size_t)((camera->width + step - 1) / step) * (size_t)((camera->height + step - 1) / step);

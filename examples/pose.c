@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* examples/pose.c -- find where a photo was taken: a camera is moved away from a view and led back by the
+/* examples/pose.c -- find where a photo was taken: a camera is displaced from a view and led back by the
    gradient of its picture.
+
    Usage: pose MODEL */
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,7 @@
 
 enum { STEPS = 200 };
 
-/* How far apart two cameras are: distance of their centres, and the angle between them in degrees. */
+/* The angle between two cameras in degrees, from the trace of their relative rotation. */
 static double angle_between(const gbt_camera *a, const gbt_camera *b)
 {
     double trace = 0;
@@ -25,7 +26,7 @@ static double distance_between(const gbt_camera *a, const gbt_camera *b)
                 pow(a->center[2] - b->center[2], 2));
 }
 
-/* One step of Adam, downhill by about `rate` in each of the six numbers. */
+/* One step of Adam: moves the camera downhill by about `rate` in each of its six degrees of freedom. */
 static void adam_step(const double gradient[6], int step, double rate, double first[6], double second[6],
                       gbt_camera *camera)
 {
@@ -39,7 +40,7 @@ static void adam_step(const double gradient[6], int step, double rate, double fi
     *camera = gbt_camera_moved(camera, motion);
 }
 
-/* Lead `camera` to where its picture is `target`; `rgb` and `d_rgb` are room for one picture each. */
+/* Move `camera` until its picture is `target`. `rgb` and `d_rgb` are scratch for one picture each. */
 static gbt_status find_pose(gbt_model *model, const float *target, float *rgb, float *d_rgb,
                             gbt_camera *camera, gbt_error *err)
 {
@@ -48,7 +49,7 @@ static gbt_status find_pose(gbt_model *model, const float *target, float *rgb, f
     double first[6] = {0}, second[6] = {0}, gradient[6];
     for (int step = 1; step <= STEPS; step++) {
         gbt_status status = gbt_model_render(model, camera, true, &picture, err);
-        for (size_t i = 0; i < values; i++) /* of the mean square difference */
+        for (size_t i = 0; i < values; i++) /* gradient of the mean squared difference */
             d_rgb[i] = 2 * (rgb[i] - target[i]) / (float)values;
         if (status == GBT_OK)
             status = gbt_model_gradient(model, d_rgb, gradient, NULL, err);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* examples/render.c -- render one view of a model to a picture that every image program opens (PPM). Usage:
-   render MODEL OUT.ppm [VIEW] */
+/* examples/render.c -- render one view of a model into a PPM file, which every image program opens.
+
+   Usage: render MODEL OUT.ppm [VIEW] */
 #include <stdio.h>
 #include <stdlib.h>
 

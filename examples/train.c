@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* examples/train.c -- train on a folder of posed photos and score the result. Usage: train DATA RUN
-   [ITERATIONS] */
+/* examples/train.c -- train on a folder of posed photos and score the result.
+
+   Usage: train DATA RUN [ITERATIONS] */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What N machines would give: a model from one run on one machine.
+"""Predict the time of a training step on N machines, from one run on one machine.
 
 Usage: bench/cluster_model.py RUN [VIEW_MS REST_MS]
 
-RUN was trained with one view a step and one process. Each of N machines renders one view of a step:
+RUN was trained with one view per step and one process. Each of N machines would render one view of a step:
 
     step(N) = view + rest + bytes(N) / bandwidth + messages(N) * latency
 
-`view` is what a process does alone (photo, rays, decode, tree, trace, loss, adjoints), `rest` what every process does again (Adam, growth):
-both from train.json, if they are not given. A row is the number of an anchor and its values (gradient, statistics). Of A anchors a view sees
-the part p. A process sends (N - 1) / N of pA rows, and while others send as many to it; then it gets as much of the sums: A (1 - (1 - p)^N)
-rows, if views were independent; views overlap, so that is an upper bound. The switch is no limit. 50 us a message, log2 N messages for each of
-six calls.
+`view` is the time for one view, of which each process has its own (photo, rays, decode, tree, trace, loss, adjoints), `rest` the time for
+work that every process repeats (Adam, growth); both come from train.json unless they are given. Processes exchange rows: the index of an
+anchor and its values (gradient, statistics). A view sees the share p of all A anchors, so a process sends (N - 1) / N of its pA rows, and
+receives as many at the same time. Then it receives the same share of the sums: A (1 - (1 - p)^N) rows if views were independent, which is an
+upper bound because views overlap. The switch is assumed not to be a limit. A message takes 50 us, and each of six calls needs log2 N messages.
 """
 import csv
 import json

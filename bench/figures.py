@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# figures -- the figures and screenshots of README.md, docs/results.md and docs/first-ten-minutes.md, made again from new runs.
+# figures -- make the figures and screenshots of README.md, docs/results.md and docs/first-ten-minutes.md again, from new runs.
 #
 #     python3 bench/figures.py PHOTOS -o DIR [--gbtrace build/release/gbtrace]
 #
-# PHOTOS holds the data sets plush, fox, castle and aerial. The demo and, for each data set, runs of 42 and 84 seconds by three seeds go into
-# DIR; a run that is already there is not repeated. Then docs/figures.txt is written, a line for each figure: a page, a colon and what the
-# page must say, as the test `figures` checks; and the screenshots in docs/images, if bench/viewers has installed its browser packages.
-# Pages are edited by hand. About 30 minutes of two cores.
+# PHOTOS holds the data sets plush, fox, castle and aerial. The demo and, for each data set, runs of 42 and 84 seconds with three seeds go into
+# DIR; a run that is already there is not repeated. Then docs/figures.txt is written, with one line per figure: a page, a colon, and the text
+# that the page must contain, which the test `figures` checks. The screenshots in docs/images are made too, if bench/viewers has installed its
+# browser packages. The pages themselves are edited by hand. Takes about 30 minutes on two cores.
 import argparse
 import csv
 import json
@@ -26,7 +26,7 @@ titles = {"plush": "plush, a toy on a bed", "fox": "fox, a mounted head", "castl
 
 
 def make(run, *words):
-    """Runs are named from DIR, so that the report shows no path of this machine."""
+    """Make a run, unless it is there. Its path is relative to DIR, so that its report shows no path of this machine."""
     path = os.path.join(args.output, run, "metrics.json")
     if not os.path.exists(path):
         subprocess.run([gbtrace, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=args.output)
@@ -35,7 +35,7 @@ def make(run, *words):
 
 
 def blended_at_the_end(run):
-    """Blended per ray in the last tenth of training."""
+    """Gaussians blended per ray, mean over the last tenth of training."""
     with open(os.path.join(args.output, run, "log.csv")) as rows:
         values = [float(row["blended_per_ray"]) for row in csv.DictReader(rows) if float(row["progress"]) > 0.9]
     return sum(values) / len(values)
@@ -51,7 +51,7 @@ def mean_and_range(runs, key):
 
 
 def row_of_results(budget, runs):
-    """A row of docs/results.md, from its column of budgets on: means over seeds, in brackets how far apart they are."""
+    """A row of docs/results.md, from its column of budgets on: means over the seeds, with ranges in brackets."""
     return (f"{budget} s | {mean_and_range(runs, 'psnr')} | {mean_and_range(runs, 'psnr_fitted')} | {mean(runs, 'ssim'):.4f} | "
             f"{mean(runs, 'iterations'):,.0f} | {mean(runs, 'anchors_initial'):,.0f}, {mean(runs, 'anchors_final'):,.0f} | "
             f"{mean(runs, 'blended'):.0f} | {mean(runs, 'model_bytes') / 1000:,.0f} kB |")
@@ -67,7 +67,7 @@ def shot(url, size, out, click=""):
 def shot_of_viewer(run, out):
     viewer = subprocess.Popen([gbtrace, "view", run, "--port", "8479", "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        while viewer.poll() is None:  # until it answers
+        while viewer.poll() is None:  # until the viewer answers
             try:
                 socket.create_connection(("127.0.0.1", 8479)).close()
                 break

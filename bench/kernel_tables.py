@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# kernel_tables -- the tables of docs/performance.md from the .json files that bench/kernel_figures has made.
+# kernel_tables -- print the tables of docs/performance.md from the .json files of bench/kernel_figures.
 #
 #     python3 bench/kernel_tables.py OUT
 #
-# A file that is not there leaves out its row.
+# Rows whose file is missing are left out.
 import json
 import os
 import sys
 
 MODELS = ("fox", "castle", "plush", "aerial", "courtyard", "vol10k", "vol100k", "surf200k")
 LENSES = ("pinhole", "fisheye", "panorama")
-VECTOR_OPERATIONS = 6.8e9  # of 16 floats, in a second of one core: bench/machine.c on the machine of docs/performance.md
+VECTOR_OPERATIONS = 6.8e9  # of 16 floats, per second on one core: bench/machine.c on the machine of docs/performance.md
 
 
 def load(name):
@@ -56,7 +56,7 @@ def errors(*kernels):
 
 
 def limits(kernel):
-    """Vector operations of sixteen rays, counted by hand from the source, forward and back, and the time that they alone would take."""
+    """Vector operations for a packet of sixteen rays, forward and adjoint, counted by hand from the source; and the time that these alone would take."""
     evaluated, rows, steps = kernel["tests_per_ray"], kernel["rows_per_packet"], kernel["row_pairs_per_packet"]
     operations = 40 * evaluated + 34 * rows + rows * rows / 8 + 10 * steps + 140 * rows
     alone, measured = 1e6 * operations / VECTOR_OPERATIONS / 16, kernel["core_us_per_ray"]

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bench/machine.c -- what one core of this machine can do: fused multiply-adds a second, bytes a second and
-   latency at each level of memory. The ceilings in docs/performance.md. Build and run: cc -O3 -march=native
-   bench/machine.c -o build/machine && build/machine */
+/* bench/machine.c -- what one core of this machine can do: fused multiply-adds per second, and bytes per
+   second and latency at each level of memory. These are the ceilings in docs/performance.md. Build and run:
+   cc -O3 -march=native bench/machine.c -o build/machine && build/machine */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,8 +17,8 @@ static double seconds(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* CHAINS independent chains hide the latency of each. Returns 1e9 vector operations (16 floats, multiply and
-   add) a second. */
+/* CHAINS independent chains of operations hide the latency of each. Returns 1e9 vector operations per second,
+   each a multiply-add of 16 floats. */
 static double fma_rate(float *keep)
 {
     vec sum[CHAINS], factor, term;
@@ -59,7 +59,7 @@ static void memory(size_t bytes, float *keep)
                 sum[k] += *(const vec *)(const void *)(data + i + k * LANES);
     const double rate = 1e-9 * (double)(times * bytes) / (seconds() - start);
     *keep += sum[0][0] + sum[1][0] + sum[2][0] + sum[3][0];
-    /* A ring through all lines in random order: each load waits for the one before. */
+    /* A cycle through all cache lines in random order, so that each load must wait for the previous one. */
     uint32_t *ring = (uint32_t *)(void *)data, state = 1;
     for (size_t i = 0; i < lines; i++)
         order[i] = (uint32_t)i;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""bench/mitsuba_scene.py -- one scene folder as arrays, in Mitsuba, and on single rays in double by Mitsuba's own equation."""
+"""bench/mitsuba_scene.py -- load one scene folder as arrays and into Mitsuba, and evaluate single rays in double by Mitsuba's own equation."""
 import json
 import os
 
@@ -9,15 +9,15 @@ import numpy as np
 
 SH0 = 0.28209479177387814
 EXTENT = 3.0           # radius of the proxies in standard deviations
-ALPHA_MIN = 0.01       # with adaptive clamping the proxy ends where the response does
-ALPHA_MAX = 0.9999     # these four are fixed in Mitsuba
+ALPHA_MIN = 0.01       # with adaptive clamping the proxy ends where the response falls to this value
+ALPHA_MAX = 0.9999     # this and the next three are constants of Mitsuba's source
 T_MIN = 0.01
 STEP = 1e-4
 NEAR = 0.01
 
 
 def read_ply(path):
-    """Columns of the vertices of a binary 3DGS file, by name."""
+    """The vertex properties of a binary 3DGS file, by name."""
     with open(path, "rb") as file:
         data = file.read()
     end = data.index(b"end_header\n") + len(b"end_header\n")
@@ -85,7 +85,7 @@ def render(scene, sensor, integrator):
 
 
 class Step:
-    """A render and the gradients of its squared error: what a training step costs."""
+    """Render, and compute the gradients of the squared error: the work of a training step."""
 
     def __init__(self, scene, sensor, integrator):
         self.scene, self.sensor, self.integrator = scene, sensor, integrator
@@ -106,7 +106,7 @@ class Step:
 
 
 def pixel_rays(camera, width, height, pixels):
-    """Origins on the near plane and unit directions through the centres of `pixels` [n,2] (x right, y down), as Mitsuba's camera has them."""
+    """Rays of Mitsuba's camera through the centres of `pixels` [n,2] (x right, y down): origins on the near plane, unit directions."""
     origin, target, up = (np.array(camera[key], np.float64) for key in ("origin", "target", "up"))
     forward = (target - origin) / np.linalg.norm(target - origin)
     left = np.cross(up, forward)
@@ -120,7 +120,7 @@ def pixel_rays(camera, width, height, pixels):
 
 
 def evaluate(arrays, adaptive, origins, directions):
-    """Colours [n,3] in double. Order by entry distance, blind within STEP behind an entry, stop at T_MIN: what Mitsuba means to do."""
+    """Colours [n,3] in double, as Mitsuba intends: blend by entry distance, skip entries within STEP behind another one, stop at T_MIN."""
     centers, scales, quats, opacities, sh = (array.astype(np.float64) for array in arrays)
     x, y, z, w = quats.T
     rotation = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
@@ -133,8 +133,8 @@ def evaluate(arrays, adaptive, origins, directions):
     color = np.maximum(0, 0.5 + SH0 * sh)
     reach2 = (extent * scales.max(1)) ** 2 * 1.0001 + 1e-12
     out = np.zeros((len(origins), 3))
-    for begin in range(0, len(origins), 16): # a few rays at a time: [rays, Gaussians] must fit
-        to_center = centers - origins[begin] # the near plane is so close that one origin serves to choose candidates
+    for begin in range(0, len(origins), 16): # a few rays at a time, since [rays, Gaussians] must fit into memory
+        to_center = centers - origins[begin] # the near plane is so close that one origin will do for choosing candidates
         distance2 = (to_center ** 2).sum(1)
         slack = np.linalg.norm(origins[begin:begin + 16] - origins[begin], axis=1).max()
         along = directions[begin:begin + 16] @ to_center.T

@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# rays_first -- training by rays from the first step beside splats first, at equal time; and training on fisheyes, panoramas and rolling
-# shutters beside pinholes.
+# rays_first -- compare training by rays from the first step with training that starts by splats, at equal time; and training on fisheyes,
+# panoramas and rolling shutters with training on pinholes.
 #
 #     python3 bench/rays_first.py PHOTOS -o DIR [--budget 42s] [--seeds 3] [--iterations N] [--gbtrace build/release/gbtrace]
 #
-# PHOTOS holds the data sets plush, fox, castle and aerial; the courtyard is made by `gbtrace make-scene`, also as a fisheye of 180 degrees, as
-# a panorama and by moving cameras, with as many pixels. Each run goes into DIR/NAME and is not repeated when it is there. Two tables go to stdout: per scene the
-# mean and the range over seeds of PSNR, SSIM and steps; per lens the same, and what a step cost. Let nothing else run meanwhile: 5 scenes, 2
-# ways, 3 seeds at 42 s take 25 minutes, the lenses 15. With --iterations N the lenses' runs are of so many steps: scores at equal pixels.
+# PHOTOS holds the data sets plush, fox, castle and aerial. `gbtrace make-scene` makes the courtyard, also as 180-degree fisheyes, as panoramas
+# and with moving cameras, all with the same number of pixels. Each run goes into DIR/NAME; a run that is already there is not repeated. Two
+# tables go to stdout: for each scene the mean and range over seeds of PSNR, SSIM and steps; for each lens the same, and the time of a step. The
+# machine must be otherwise idle: 5 scenes, 2 ways and 3 seeds at 42 s take 25 minutes, the lenses 15. With --iterations N the runs of the
+# lenses have N steps instead of a time, so that their scores are at an equal number of pixels.
 import argparse
 import json
 import os
@@ -32,8 +33,8 @@ def call(*words):
 
 
 def make_scene(name, *words):
-    """The courtyard as photos; 76,800 pixels each, whatever the lens."""
-    last = "transforms.json" if "rolling" in words else "sparse/0/points3D.bin"  # of what make-scene writes
+    """Make the courtyard as photos, unless it is there; 76,800 pixels per photo with every lens."""
+    last = "transforms.json" if "rolling" in words else "sparse/0/points3D.bin"  # the file that make-scene writes last
     if not os.path.exists(os.path.join(args.output, name, last)):
         call("make-scene", "courtyard", "-o", name, "--views", "100", *words)
     return name
@@ -45,7 +46,7 @@ def load(run, file):
 
 
 def train(data, name, seed, *words):
-    """Scores of a run, and what is in its train.json."""
+    """Make a run, unless it is there. Returns its metrics.json and its train.json."""
     length = ("--iterations", str(args.iterations)) if args.iterations else ("--budget", args.budget)
     run = f"{name}_{length[1]}_{seed}"
     if not os.path.exists(os.path.join(args.output, run, "metrics.json")):
@@ -74,7 +75,7 @@ for scene, data in () if args.iterations else scenes.items():
     large = ("--downscale", "1.33333") if scene != "courtyard" else ()
     ways = {"rays from the first step": (), "splats first": ("--splats-until", "0.7")}
     runs = {way: [] for way in ways}
-    for seed in seeds:  # in turns, so that both ways see the same drift of the machine
+    for seed in seeds:  # taking turns, so that slow changes of the machine's speed affect both ways alike
         for way, words in ways.items():
             runs[way].append(train(data, f"{scene}_{way.split()[0]}", seed, *large, *words))
     for way in ways:
@@ -87,7 +88,7 @@ lenses = {"pinhole": pinhole,
           "rolling shutter": make_scene("courtyard_rolling", "--lens", "rolling", "--width", "320", "--height", "240")}
 print("\n| lens | training | PSNR | SSIM | steps | build, trace and adjoint, ms a step |\n|---|---|---|---|---|---|")
 runs = {lens: [] for lens in lenses}
-for seed in seeds:  # in turns, so that all lenses see the same drift of the machine
+for seed in seeds:  # taking turns, so that slow changes of the machine's speed affect all lenses alike
     for lens, data in lenses.items():
         runs[lens].append(train(data, f"{os.path.basename(data)}_rays", seed))
 for lens in lenses:

@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# refined_poses -- what --refine-poses makes of poses that are wrong: held-out PSNR of photos with the poses of the data set, and with these disturbed.
+# refined_poses -- how well --refine-poses corrects wrong poses: held-out PSNR with the poses of the data set, and with perturbed ones.
 #
 #     python3 bench/refined_poses.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1200] [--seeds 0,1] [--degrees 0.5] [--part 0.01]
 #                                    [more options of train]
 #
-# DATA is a COLMAP data set (images.bin). Every camera, held out or not, is turned by --degrees about a random axis, and moved by --part of the
-# extent of all cameras in a random direction; points stay. Four runs per scene and seed: given poses, disturbed ones, each as they are and
-# refined. Refined runs score a held-out photo from the pose at which the scene fits it best. A run that is already in DIR is not repeated.
+# DATA is a COLMAP data set (images.bin). Every camera, held out or not, is rotated by --degrees about a random axis, and moved in a random
+# direction by the share --part of the extent of all cameras; points stay. Four runs per scene and seed: with given and with perturbed poses,
+# each fixed and refined. Refined runs score a held-out photo from the pose at which the model fits it best. A run that is already in DIR is
+# not repeated.
 import argparse
 import json
 import math
@@ -35,7 +36,7 @@ def direction(rng):
 
 
 def product(a, b):
-    """Of quaternions, real part first."""
+    """Product of two quaternions, real part first."""
     return [a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
             a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
             a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
@@ -51,7 +52,7 @@ def inverse(q):
 
 
 def disturb(source, out, seed):
-    """A copy of a data set with other poses."""
+    """Copy a data set, with other poses."""
     sparse = os.path.join(source, "sparse", "0")
     target = os.path.join(out, "sparse", "0")
     os.makedirs(target, exist_ok=True)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# renderers -- the same scenes trained by ray tracing and by splatting: held-out PSNR and time, at equal iterations and at equal time.
+# renderers -- train the same scenes by ray tracing and by splatting: held-out PSNR and time, at equal iterations and at equal time.
 #
 #     python3 bench/renderers.py DATA... -o DIR [--gbtrace build/release/gbtrace] [--iterations 1500] [--seeds 0,1,2] [--downscale 1]
 #
-# Four runs per scene and seed: traced, N iterations; splatted, N iterations; splatted for as long as the traced run took; and, for as long,
-# splats for the first 70 % and then rays. A run that is already in DIR is not repeated. Each model is scored as it was trained, and
-# drawn by the other renderer too.
+# Four runs per scene and seed: traced for N iterations; splatted for N iterations; splatted for the time that the traced run took; and, for
+# the same time, splatted for the first 70 % and then traced. A run that is already in DIR is not repeated. Each model is scored with the
+# renderer that trained it, and with the other one.
 import argparse
 import json
 import os

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# scaling -- the same hits per ray from 10 thousand to 1 million Gaussians: time of one core per ray, build, bytes.
+# scaling -- 10 thousand to 1 million Gaussians with the same number of hits per ray: core time per ray, build time, bytes.
 #
 #     python3 bench/scaling.py [--gbtrace build/release/gbtrace] [--sizes 1600,512] [--counts 10000,100000,1000000]      (needs numpy)
 #
-# Gaussians fill a cube evenly. Their size goes with the inverse square root of their number, so that a ray always crosses about 30. In a picture
-# of 1600 x 1600 pixels, a photo's size, the Gaussians of a million are some pixels wide; at 512 x 512 there are four Gaussians for every ray.
+# The Gaussians fill a cube evenly. Their size is proportional to the inverse square root of their number, so that a ray always crosses about
+# 30. In a picture of 1600 x 1600 pixels, the size of a photo, a million Gaussians are a few pixels wide each; at 512 x 512 there are four
+# Gaussians per ray.
 import argparse
 import json
 import os

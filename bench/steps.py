@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-# steps -- where a training step's time goes: its stages on one thread and on all, what more cores would make of it, and how far each stage is from
-# what a core can compute and move.
+# steps -- where the time of a training step goes: its stages on one thread and on all, an estimate for more cores, and a roofline that compares
+# each stage with the arithmetic and memory limits of a core.
 #
 #     python3 bench/steps.py DATA ITERATIONS [--gbtrace build/release/gbtrace] [--before OTHER] [--threads 2] [-- TRAIN OPTIONS]
 #
-# Runs of a fixed number of steps, one after the other: on one thread, on --threads, and --before's on --threads. Needs a machine that does nothing
-# else. The ceilings are bench/machine.c's: cc -O3 -march=native bench/machine.c -o build/machine (without it, no roofline).
+# Runs of a fixed number of steps, one after the other: on one thread, on --threads, and by the program --before on --threads. The machine must be
+# otherwise idle. The limits come from bench/machine.c: cc -O3 -march=native bench/machine.c -o build/machine (without it, no roofline).
 import argparse
 import json
 import os
@@ -52,7 +52,8 @@ def stage_table(one, all_threads, before):
         print(f"| {stage} |" + "|".join(f" {c:.2f} " for c in cells) + "|")
 
 
-# The calls of a step follow each other: on p cores it takes between the larger of work / p and span, and their greedy bound.
+# Bounds on the time of a step on p cores, from its work and its span: at least max(work / p, span), at most (work - span) / p + span for any
+# greedy scheduler.
 def core_table(runs):
     print("\n| threads | measured, ms | " + " | ".join(f"from {r['threads']}: least, most" for r in runs) + " |\n|---|---|" + "---|" * len(runs))
     measured = {r["threads"]: r[WALL]["all"] for r in runs}
@@ -64,14 +65,14 @@ def core_table(runs):
         print(f"| {cores} | " + (f"{measured[cores]:.2f}" if cores in measured else "") + " | " + " | ".join(cells) + " |")
 
 
-# (bytes, floating-point operations) of a step of this program, in means over the run: K = 2 Gaussians an anchor.
+# (bytes, floating-point operations) of each stage of a step, from means over the run; K = 2 Gaussians per anchor.
 def counts_of(r):
     pixels, visible, gaussians, anchors = r["rays_per_step"], r["visible_per_view"], r["gaussians_per_view"], r["anchors_final"]
-    rows = min(visible, gaussians / 1.6)  # visible anchors that have Gaussians: 1.5 to 1.8 each in fox, castle and plush
+    rows = min(visible, gaussians / 1.6)  # visible anchors with Gaussians, which have 1.5 to 1.8 each in fox, castle and plush
     learned = FEATURES + 3 * OFFSETS + 6
     decode = 2 * (visible * (NETWORK_INPUTS * HIDDEN + HIDDEN * OFFSETS) + rows * (2 * NETWORK_INPUTS * HIDDEN + HIDDEN * 10 * OFFSETS))
     adjoint = 2 * rows * (3 * HIDDEN * (NETWORK_INPUTS + 1) + 3 * HIDDEN * FEATURES + 2 * HIDDEN * 11 * OFFSETS)
-    again = 2 * rows * 3 * HIDDEN * NETWORK_INPUTS  # hidden layers, which are not kept
+    again = 2 * rows * 3 * HIDDEN * NETWORK_INPUTS  # hidden layers, computed again because they are not kept
     inputs = 4 * (3 + FEATURES)
     hits = pixels * r["blended_per_ray"]
     return {
@@ -98,7 +99,7 @@ def roofline(one):
     print("| stage | MB | Mflop | ms | GB/s | GFLOP/s | ms at the limit | of the time |\n" + "|---" * 8 + "|")
     for stage, (moved, flops) in counts_of(one).items():
         ms = one[WALL][stage]
-        double = 2 if stage == "loss" else 1  # computed in double precision
+        double = 2 if stage == "loss" else 1  # computed in double precision, at half the rate
         least = 1e3 * max(moved / (1e9 * memory), double * flops / (1e9 * peak))
         print(f"| {stage} | {moved / 1e6:.2f} | {flops / 1e6:.1f} | {ms:.2f} | {moved / 1e6 / max(ms, 1e-9):.1f} | {flops / 1e6 / max(ms, 1e-9):.1f} | {least:.2f} | {100 * least / max(ms, 1e-9):.0f} % |")
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, in turns, one thread.
-   Needs libopenblas-dev. Build and run: cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c
+/* bench/versus_blas.c -- the decoder's matrix products by our kernels and by OpenBLAS, taking turns, on one
+   thread. Needs libopenblas-dev. Build and run: cc -O3 -march=native -Isrc -Iinclude bench/versus_blas.c
    build/release/libgbtrace.a -lopenblas -lm -o build/versus_blas && build/versus_blas */
 #include <cblas.h>
 #include <math.h>

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bench/versus_flann.c -- nearest neighbours by our tree, FLANN's exact and approximate trees, and brute
-   force, one thread: the table of docs/queries.md. Fails when their distances differ. Needs libflann-dev.
-   Build and run, up to a number of points (Embree 4: -lembree4):
-   cc -O3 -Isrc -Iinclude bench/versus_flann.c build/release/libgbtrace.a -lembree3 -ltbb -lflann -lstdc++ -lm
-   -o build/versus_flann && build/versus_flann 10000000 */
+/* bench/versus_flann.c -- nearest neighbours by our tree, by FLANN's exact and approximate trees, and by
+   brute force, on one thread: the table of docs/queries.md. Fails if an exact method finds other distances.
+   Needs libflann-dev. Build and run; the argument is the largest number of points (Embree 4: -lembree4): cc
+   -O3 -Isrc -Iinclude bench/versus_flann.c build/release/libgbtrace.a -lembree3 -ltbb -lflann -lstdc++ -lm -o
+   build/versus_flann && build/versus_flann 10000000 */
 #include <flann/flann.h>
 #include <math.h>
 #include <stdio.h>
@@ -15,7 +15,7 @@
 #include "bvh/points.h"
 
 enum { QUERIES = 20000, K = 8, CHECKS = 64, BRUTE_PAIRS = 40000000 };
-enum { APPROXIMATE_MAX = 1000000 }; /* beyond it, building random trees takes most of the time */
+enum { APPROXIMATE_MAX = 1000000 }; /* above it, building the random trees would dominate the run time */
 enum { BATCH, SINGLE, FLANN, APPROXIMATE, BRUTE, WAYS };
 
 static const char *const clouds[] = {"random", "surface", "sparse"};
@@ -28,7 +28,7 @@ static point_tree *tree;
 static flann_index_t flann;
 static struct FLANNParameters parameters;
 
-/* Point i; another seed gives other points of the same cloud. */
+/* Point i of a cloud; another seed gives other points of the same distribution. */
 static void cloud_point(int cloud, uint64_t seed, size_t i, float *out)
 {
     double p[3];
@@ -36,9 +36,9 @@ static void cloud_point(int cloud, uint64_t seed, size_t i, float *out)
         p[j] = cloud == 0 ? 2 * (double)rng_uniform(seed, j, i) - 1 : rng_normal(seed, j, i);
     const double length = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) + 1e-9;
     double radius = 1 + 0.1 * sin(5 * p[0] / length) * cos(4 * p[1] / length);
-    if (cloud == 1) /* a surface, and a little noise on it */
+    if (cloud == 1) /* a surface with a little noise */
         radius += 0.002 * rng_normal(seed, 3, i);
-    else /* as from photos: densities over orders of magnitude, and outliers */
+    else /* as from photos: densities of several orders of magnitude, and outliers */
         radius *= exp(1.5 * rng_normal(seed, 3, i)) * (i % 100 == 0 ? 30 : 1);
     for (int j = 0; j < 3; j++)
         out[j] = (float)(cloud == 0 ? p[j] : p[j] * radius / length);
@@ -59,7 +59,7 @@ static void ask_brute(const float *q, size_t k, double *best)
     }
 }
 
-/* The k nearest of every query: squared distances into d2, of FLANN into flann_d2. */
+/* The k nearest neighbours of every query: squared distances into d2, or into flann_d2 for FLANN. */
 static void ask(int way, size_t k)
 {
     if (way == BATCH)
@@ -77,14 +77,14 @@ static void ask(int way, size_t k)
     }
 }
 
-/* Core-seconds. */
+/* Build the index of a method. Returns core-seconds. */
 static double build(int way)
 {
     float speedup;
     parameters = DEFAULT_FLANN_PARAMETERS;
     parameters.algorithm = way == FLANN ? FLANN_INDEX_KDTREE_SINGLE : FLANN_INDEX_KDTREE;
     parameters.checks = way == FLANN ? FLANN_CHECKS_UNLIMITED : CHECKS;
-    parameters.leaf_max_size = 10; /* its own default */
+    parameters.leaf_max_size = 10; /* FLANN's default */
     parameters.cores = 1;
     parameters.sorted = 1;
     parameters.random_seed = 1;
@@ -97,8 +97,8 @@ static double build(int way)
     return clock_process() - start;
 }
 
-/* Core-microseconds per query, the least of three; per cent of the neighbours that are as near as the true
-   ones. Squared distances of float32 (FLANN) have errors of a few 2^-24. */
+/* Core-microseconds per query, minimum of three, and in *right the percentage of neighbours that are as near
+   as the true ones. FLANN's squared distances in float32 have relative errors of a few 2^-24. */
 static double measure(int way, size_t k, double *right)
 {
     const bool is_flann = way == FLANN || way == APPROXIMATE;
@@ -117,7 +117,7 @@ static double measure(int way, size_t k, double *right)
     return 1e6 * best / (double)queries;
 }
 
-/* A row of the table; false when an exact way finds other distances. */
+/* Print a row of the table; false if an exact method finds other distances. */
 static bool compare(int cloud)
 {
     bool same = true;

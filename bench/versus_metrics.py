@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PSNR, SSIM, FLIP and LPIPS of pairs of PNG files by gbtrace and by others; see bench/versus_metrics."""
+"""bench/versus_metrics.py -- PSNR, SSIM, FLIP and LPIPS of pairs of PNG files, by gbtrace and by other programs; see bench/versus_metrics."""
 
 import json
 import pathlib
@@ -15,17 +15,17 @@ import safetensors.numpy
 from scipy import ndimage
 from skimage import io, metrics
 
-# Largest difference that counts as the same. Of FLIP, 7e-4 between black and white, where constants of colour are rounded; else 1e-5.
+# Largest difference that counts as equal. FLIP differs by 7e-4 between black and white, because of rounded colour constants, and else by 1e-5.
 LIMITS = {"psnr": 1e-6, "ssim_interior": 1e-6, "flip": 1e-3, "lpips": 1e-5, "lpips_01": 1e-5}
 NAMES = {"psnr": "PSNR, dB", "ssim_interior": "SSIM", "flip": "FLIP", "lpips": "LPIPS", "lpips_01": "LPIPS of [0, 1]"}
-SMALLEST = 16  # pixels on a side that VGG16 takes
+SMALLEST = 16  # side of the smallest picture that VGG16 accepts, pixels
 
-# Channels of VGG16's convolutions; "M": maxima. Compared behind the last convolution before each "M", and at the end.
+# Channels of VGG16's convolutions; "M": max pooling. LPIPS compares the output of the last convolution before each "M", and of the last one.
 VGG = [64, 64, "M", 128, 128, "M", 256, 256, 256, "M", 512, 512, 512, "M", 512, 512, 512]
 
 
 class Vgg:
-    """VGG16 with random weights: a graph for ONNX Runtime, and the file that gbtrace reads."""
+    """VGG16 with random weights, as a graph for ONNX Runtime and as the file that gbtrace reads."""
 
     def __init__(self, path):
         random, state = numpy.random.default_rng(6), {}
@@ -77,7 +77,7 @@ def picture(width, height, seed):
 
 
 def made_pairs():
-    """(name, picture, reference) of many kinds of difference."""
+    """Triples (name, picture, reference) that differ in many ways."""
     random = numpy.random.default_rng(1)
     base = picture(320, 240, 2)
     for sigma in (0.002, 0.01, 0.05, 0.2):

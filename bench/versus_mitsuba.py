@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""bench/versus_mitsuba.py -- the measurement and the tables of bench/versus_mitsuba, which prepares the environment and calls this."""
+"""bench/versus_mitsuba.py -- measure and print the tables; bench/versus_mitsuba prepares the environment and calls this."""
 import argparse
 import json
 import os
@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 mi.set_variant("llvm_ad_rgb")
-import mitsuba_scene as peer # wants the variant
+import mitsuba_scene as peer # imported only now: it needs the variant
 
 MODES = {
     "defaults": (False, [], "Each at its own settings. Mitsuba: proxies of 3 standard deviations, stop at T <= 0.01. gbtrace: responses down to 1/255 "
@@ -53,7 +53,7 @@ class Gbtrace:
 
 
 def rounds(count, first, second):
-    """Medians of both, each after one run that does not count, taking turns at going first."""
+    """Median results of two functions, after one warm-up call of each. They alternate in going first."""
     first(), second()
     taken = ([], [])
     for i in range(count):

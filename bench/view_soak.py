@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""bench/view_soak.py -- `gbtrace view` while a scene is orbited for a long time: does its memory stay flat?
+"""bench/view_soak.py -- check that the memory of `gbtrace view` does not grow while a scene is orbited for a long time.
 
-Pictures in all formats, of cameras on an orbit and of photos, picks, and clients that leave before their picture is there. Prints resident
-memory each 30 s; exit code 1 when the mean of the last quarter is more than 5 % above that of the second.
+Requests pictures in all formats, of cameras on an orbit and of photos, and picks; some clients disconnect before their picture is ready. Prints
+resident memory every 30 s. Exit code 1 if the mean of the last quarter is more than 5 % above that of the second quarter.
 
 Usage: view_soak.py PROGRAM RUN [--minutes 10]
 """

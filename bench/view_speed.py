@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""bench/view_speed.py -- pictures a second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
+"""bench/view_speed.py -- pictures per second of `gbtrace view` in headless Chromium while the scene is turned, and where the time goes.
 
-Milliseconds are wall time; the last column is processor time of the server, per picture.
+Milliseconds are wall time; the last column is CPU time of the server per picture.
 
 Usage: view_speed.py PROGRAM RUN [--size 480x640] [--window 1280x900] [--seconds 10] [--screenshots FOLDER]
 """
@@ -26,7 +26,7 @@ def choose(page, name, value):
 
 
 def turn(page, seconds):
-    """Drag to and fro; the pictures that came in the meantime."""
+    """Drag to and fro; returns the pictures received meanwhile."""
     page.run("window.seen = []")
     x, y = page.run("(() => { const b = document.getElementById('render').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
     page.mouse("mousePressed", x, y, button="left", clickCount=1)
@@ -43,7 +43,7 @@ def turn(page, seconds):
 
 
 def core_ms(process):
-    """Processor time of all its threads so far: steadier than wall time on a machine that others use too."""
+    """CPU time of all threads of a process so far: less noisy than wall time on a shared machine."""
     with open(f"/proc/{process.pid}/stat", encoding="ascii") as file:
         words = file.read().rpartition(")")[2].split()
     return 1000 * (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")

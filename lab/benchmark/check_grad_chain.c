@@ -17,12 +17,12 @@ enum { ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };
    cut-off. */
 static const double decode_limit = 1e-5, chain_limit = 1e-3;
 
-static const double step =
-    1e-8; /* step of the differences, in standard deviations of the direction: small, to cross few cut-offs */
-static const double smooth_limit = 1e-4; /* largest relative disagreement of the two one-sided differences;
-                                            beyond it a cut-off was crossed */
-static const double gradient_floor =
-    1e-6; /* smaller gradients vanish in the rounding of a difference of double losses */
+/* Step of the differences, in standard deviations of the direction: small, to cross few cut-offs. */
+static const double step = 1e-8;
+/* Largest relative disagreement of the two one-sided differences; beyond it a cut-off was crossed. */
+static const double smooth_limit = 1e-4;
+/* Smaller gradients vanish in the rounding of a difference of double losses. */
+static const double gradient_floor = 1e-6;
 
 /* A class of parameters, in the three representations in which it is needed here. */
 typedef struct parameter_class {

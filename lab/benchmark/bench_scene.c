@@ -50,8 +50,7 @@ static gbt_status trace_rays(void *context, trace_scene *built, const ray_image 
 
 gbt_status bench_scene_decode(bench_scene *s, gbt_error *err)
 {
-    const frame_tracer whole = {.trace = trace_rays}; /* with a tracer given, all Gaussians in view are kept
-                                                       */
+    const frame_tracer whole = {.trace = trace_rays}; /* given a tracer, nothing is left out */
     GBT_TRY(frame_render_with(&s->run.frame, loaded_run_subject(&s->run), &s->camera.shot, &s->settings,
                               s->is_plain ? &whole : NULL, err));
     s->gaussians = frame_drawn(&s->run.frame);

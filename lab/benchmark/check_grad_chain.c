@@ -64,8 +64,7 @@ static void list_classes(grad_checker *c, parameter_class out[CLASS_COUNT])
 gbt_status grad_check_decode(grad_checker *c, gbt_error *err)
 {
     frame *f = c->frame;
-    GBT_TRY(grad_render_at(c, c->view, c->width, err)); /* again, since a recorded pass has only one adjoint
-                                                         */
+    GBT_TRY(grad_render_at(c, c->view, c->width, err)); /* a recorded pass has one adjoint */
     GBT_TRY(frame_backward_gaussians(f, &c->d_image, err));
     loss_add_gradient(&f->gaussians, grad_volume_weight(c), &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &c->run->model.anchors, &c->run->model.decoder, &c->d_anchors,

@@ -60,8 +60,7 @@ void draw_turned(double yaw, double pitch, double rotation[9]);
 /** Largest absolute difference; NaN if a value is not finite. */
 double draw_difference(const float *a, const float *b, size_t count);
 double draw_error(const float *a, const double *exact, size_t count);
-double draw_psnr(const float *a, const double *exact, size_t count); /* for values in [0, 1], at most 200 dB
-                                                                      */
+double draw_psnr(const float *a, const double *exact, size_t count); /* values in [0, 1]; at most 200 dB */
 
 /** The number of values that are not finite. */
 size_t draw_count_bad(const float *values, size_t count);

@@ -405,9 +405,8 @@ gbt_status camera_path_order(gbt_camera *cameras, size_t count, double turn_leng
             }
         }
         const gbt_camera next = nearest[best];
-        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the rest keep their order, so
-                                                                                that ties are resolved by name
-                                                                              */
+        memmove(nearest + i + 1, nearest + i, (best - i) * sizeof *nearest); /* the rest keep their order:
+                                                                                ties are resolved by name */
         nearest[i] = next;
         to_nearest += least;
     }

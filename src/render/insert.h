@@ -26,8 +26,7 @@ typedef struct insert_scene {
     insert_lamp lamp;
     double lamp_at[3];  /* position of the lamp's centre; for a distant lamp the unit vector towards it */
     double lamp_radius; /* of a point lamp: makes it a ball with soft shadows; >= 0 */
-    float ambient; /* light that reaches every surface, [0, 1]; the lamp adds 1 - ambient where it is visible
-                    */
+    float ambient;      /* light on every surface, [0, 1]; the lamp adds 1 - ambient where it is visible */
     size_t object_count, object_capacity;
     insert_object *objects;
     size_t vertex_count, vertex_capacity, normal_capacity, triangle_count, triangle_capacity;

@@ -207,8 +207,8 @@ static size_t choose_view(const loaded_run *r, const evaluation *e)
     return chosen;
 }
 
-/** A pinhole with the lens's field of view, for drawing the solids, at least SIDE_MAX pixels long. False for
-    a lens that is too wide or too narrow for one. */
+/** A pinhole with the lens's field of view and a longer side of SIDE_MAX pixels, for drawing the solids.
+   False for a lens that is too wide or too narrow for one. */
 static bool find_pinhole(const gbt_camera *lens, gbt_camera *out)
 {
     double tan_half[2];

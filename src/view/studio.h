@@ -24,8 +24,7 @@ typedef struct studio {
     const char *input, *data;              /* borrowed */
     char model_path[4096], log_path[4096]; /* log_path: empty if there is none */
     struct stat loaded;                    /* of the open model file, to notice a newer one */
-    gbt_renderer trained; /* trained, background: the renderer and background that the model was trained with
-                           */
+    gbt_renderer trained;                  /* with background: those that the model was trained with */
     float background[3];
     loaded_run *run;         /* NULL: nothing has been saved yet */
     int64_t started;         /* microseconds: lets a page notice that another viewer process answers now */

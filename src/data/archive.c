@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/archive.c -- libzip on bytes. */
+/* data/archive.c -- reads and writes .zip archives in memory with libzip. */
 #include "data/archive.h"
 
 #include <zip.h>
@@ -7,10 +7,12 @@
 enum {
     LOCAL_HEADER_BYTES = 30,
     EXTRA_HEADER_BYTES = 4,
-    EXTRA_PADDING = 0x1986, /* the number under which .usdz files pad */
+    EXTRA_PADDING = 0x1986, /* extra field that pads a member to an alignment, as .usdz writers use it */
     ALIGN_MAX = 64,
-    FIRST_DAY = 1 << 5 | 1, /* that DOS counts: no time of writing is kept */
-    RATIO_MAX = 1032        /* deflate makes nothing smaller than that */
+    FIRST_DAY = 1 << 5 | 1, /* 1 January in DOS format, with year 1980 = 0: a fixed date gives the same bytes
+                               every time */
+    RATIO_MAX = 1032 /* largest compression ratio of deflate: a higher one in the directory is damage or an
+                        attack */
 };
 
 /* ---- writing ---- */
@@ -48,7 +50,7 @@ static gbt_status add_member(zip_t *archive, const char *path, const archive_mem
     return GBT_OK;
 }
 
-/* What libzip has written into its buffer. */
+/* Append the archive that libzip has built in its buffer. */
 static gbt_status put_source(sink *out, const char *path, zip_source_t *source, gbt_error *err)
 {
     zip_stat_t info;
@@ -74,7 +76,7 @@ gbt_status archive_put(sink *out, const char *path, const archive_member *member
     zip_source_t *source = zip_source_buffer_create(NULL, 0, 0, &why);
     if (source == NULL)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
-    zip_source_keep(source); /* for us, beside the archive */
+    zip_source_keep(source); /* zip_close() would free the buffer, which is still to be read */
     zip_t *archive = zip_open_from_source(source, ZIP_TRUNCATE, &why);
     if (archive == NULL) {
         zip_source_free(source);
@@ -132,7 +134,7 @@ static gbt_status take(zip_t *archive, const source_file *file, const char *memb
     gbt_status status = *bytes == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     unsigned char more;
     if (status == GBT_OK && (zip_fread(inside, *bytes, info.size) != (zip_int64_t)info.size ||
-                             zip_fread(inside, &more, 1) != 0)) /* the checksum is looked at by the last */
+                             zip_fread(inside, &more, 1) != 0)) /* reading to the end checks the CRC */
         status = base_fail(err, GBT_ERR_FORMAT, "%s: %s inside is damaged", file->name, member);
     zip_fclose(inside);
     if (status == GBT_OK)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/archive.h -- .zip archives in memory, by libzip. */
+/* data/archive.h -- .zip archives in memory, read and written with libzip. */
 #ifndef GBT_DATA_ARCHIVE_H
 #define GBT_DATA_ARCHIVE_H
 
@@ -13,23 +13,23 @@ typedef struct archive_member {
 } archive_member;
 
 /**
- * Put an archive of members that are stored as they are, the same bytes for the same members.
+ * Append an archive with uncompressed members. The same members always give the same bytes.
  *
- * @param align [in] each member's bytes begin at a multiple of this; 1: anywhere
+ * @param align [in] each member's data starts at a multiple of this many bytes; 1: no alignment
  * @return GBT_OK; GBT_ERR_ARGUMENT (4 GiB or more); GBT_ERR_NO_MEMORY
  */
 gbt_status archive_put(sink *out, const char *path, const archive_member *members, size_t count, size_t align,
                        gbt_error *err);
 
 /**
- * A member's bytes, unpacked, with an extra zero byte behind them (not counted). Free with mem_free().
+ * Extract a member. One zero byte is added behind its data and not counted in `size`. Free with mem_free().
  *
- * @return GBT_OK; GBT_ERR_FORMAT (no archive, no such member, damaged, encrypted); GBT_ERR_NO_MEMORY
+ * @return GBT_OK; GBT_ERR_FORMAT (not an archive, no such member, damaged, encrypted); GBT_ERR_NO_MEMORY
  */
 gbt_status archive_take(const source_file *file, const char *member, unsigned char **bytes, size_t *size,
                         gbt_error *err);
 
-/** The name of the first member that ends so, in `out`; GBT_ERR_FORMAT when there is none. */
+/** Write the name of the first member with this ending into `out`. GBT_ERR_FORMAT when there is none. */
 gbt_status archive_find(const source_file *file, const char *ending, char *out, size_t out_size,
                         gbt_error *err);
 

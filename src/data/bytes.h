@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/bytes.h -- the bounded cursor that every binary reader stands on, and the growing buffer of every
-   writer.
+/* data/bytes.h -- a bounds-checked cursor for all binary readers, and a growing buffer for all writers.
 
-   No read leaves [0, size): a read past the end gives 0 and sets `short_read`. Readers ask cursor_need()
-   before each record, so that the message names the record, and check counts with cursor_count_fits() before
-   they allocate. Byte order is spelled out by shifts. */
+   No read leaves [0, size): a read past the end gives 0 and sets `short_read`. Readers call cursor_need()
+   before each record, so that the error message names the record, and check counts with cursor_count_fits()
+   before they allocate. Values are assembled from bytes with shifts, so the host's byte order does not
+   matter. */
 #ifndef GBT_DATA_BYTES_H
 #define GBT_DATA_BYTES_H
 
@@ -17,7 +17,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-/** A file in memory; `name` is for messages only. Borrowed by whoever gets it. */
+/** A file in memory; `name` is for messages only. Functions only borrow it. */
 typedef struct source_file {
     const char *name;
     const unsigned char *bytes;
@@ -32,7 +32,7 @@ typedef struct cursor {
 
 static inline size_t cursor_left(const cursor *c) { return c->file->size - c->at; }
 
-/** Fails with the place and both sizes when fewer than `byte_count` bytes are left. */
+/** Fails when fewer than `byte_count` bytes are left; the message gives the offset and both sizes. */
 static inline gbt_status cursor_need(const cursor *c, size_t byte_count, const char *what, gbt_error *err)
 {
     if (cursor_left(c) >= byte_count)
@@ -41,7 +41,7 @@ static inline gbt_status cursor_need(const cursor *c, size_t byte_count, const c
                      c->file->name, c->at, what, byte_count, cursor_left(c));
 }
 
-/** True when `count` records of at least `record_bytes` (> 0) can still follow. */
+/** True when the remaining bytes can hold `count` records of at least `record_bytes` (> 0). */
 static inline bool cursor_count_fits(const cursor *c, uint64_t count, size_t record_bytes)
 {
     return count <= cursor_left(c) / record_bytes;
@@ -89,7 +89,7 @@ static inline double cursor_f64(cursor *c)
     return value;
 }
 
-/** Bytes to be written, growing. After the first failure `status` stays set and further puts do nothing. */
+/** A growing output buffer. After the first failure `status` stays set and further puts do nothing. */
 typedef struct sink {
     unsigned char *bytes; /* owned; free with sink_free() */
     size_t size, capacity;
@@ -134,7 +134,8 @@ static inline void sink_put_f32(sink *s, float value)
     sink_put_uint(s, bits, 4);
 }
 
-/** The nearest of 0..255, halves upwards; NaN becomes 0. */
+/** Append `value` as a byte: rounded to the nearest integer (halves up) and clamped to [0, 255]; NaN becomes
+    0. */
 static inline void sink_put_level(sink *s, double value)
 {
     sink_put_uint(s, value >= 255 ? 255 : value > 0 ? (uint64_t)(value + 0.5) : 0, 1);
@@ -148,7 +149,7 @@ static inline void sink_free(sink *s)
     memset(s, 0, sizeof *s);
 }
 
-/** All of it to a file, whole or not at all; freed either way. */
+/** Write the buffer to a file atomically, and free it whether or not that succeeds. */
 static inline gbt_status sink_write(sink *s, const char *path)
 {
     const gbt_status status =

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/cameras_json.c -- [{id, img_name, width, height, position[3], rotation[3][3], fy, fx}] to views. */
+/* data/cameras_json.c -- cameras.json, [{id, img_name, width, height, position[3], rotation[3][3], fy, fx}],
+   to views. */
 #include "data/cameras_json.h"
 
 #include <jansson.h>
@@ -33,8 +34,8 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
         const json_t *row = json_array_get(rotation, i);
         fine = json_array_size(row) == 3 && get_number(json_array_get(position, i), &out->center[i]);
         for (size_t k = 0; k < 3 && fine; k++)
-            fine =
-                get_number(json_array_get(row, k), &out->rotation[3 * k + i]); /* its columns are our rows */
+            fine = get_number(json_array_get(row, k), &out->rotation[3 * k + i]); /* transposed: world to
+                                                                                     camera */
     }
     if (!fine)
         return raw_fail(err, place,
@@ -53,8 +54,8 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
     return raw_check_camera(out, place, err);
 }
 
-/* 3DGS calls the photos of Blender's scenes by their names without folders: "r_0" of the test and of the
-   training views. */
+/* 3DGS stores image names without folders, so in Blender's synthetic scenes a training view and a test view
+   are both called "r_0". */
 static bool is_taken(const scene *s, const char *name)
 {
     for (size_t i = 0; i < s->view_count; i++)

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/cameras_json.h -- cameras.json of a 3DGS result folder: pinholes to look from, without photos. */
+/* data/cameras_json.h -- reads the cameras.json of a 3DGS result folder: pinhole cameras without photos. */
 #ifndef GBT_DATA_CAMERAS_JSON_H
 #define GBT_DATA_CAMERAS_JSON_H
 
 #include "data/scene.h"
 
 /**
- * Read the cameras as the views of a scene without photos (`path` is NULL), all marked as held out: none of
- * them is to be trained on.
+ * Read the cameras as the views of a scene without photos (`path` is NULL), all marked as held out so that
+ * none is trained on.
  *
- * The principal point is the middle, as the file knows no other; the origin is 0. Rotations are camera to
- * world, COLMAP's axes.
+ * The file has no principal point, so the image centre is used; the origin is 0. Its rotations are camera to
+ * world, with COLMAP's camera axes.
  * @param out [out] free with scene_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */

@@ -5,7 +5,8 @@
 enum {
     CAMERA_BYTES = 24,       /* id, model, width, height */
     IMAGE_BYTES = 64,        /* id, quaternion, translation, camera id */
-    IMAGE_LEAST_BYTES = 74,  /* a name of one letter, its zero, the count of observations */
+    IMAGE_LEAST_BYTES = 74,  /* with a name of one letter and its terminating zero, and the number of
+                                observations */
     OBSERVATION_BYTES = 24,  /* x, y, point id */
     POINT_BYTES = 51,        /* id, position, colour, error, track length */
     TRACK_ENTRY_BYTES = 8,   /* image id, observation index */
@@ -14,7 +15,8 @@ enum {
 
 static raw_place place_of(const cursor *c) { return (raw_place){c->file->name, '@', c->at}; }
 
-/* The count at the start of each file, checked against the bytes that follow it before anybody allocates. */
+/* Read the count at the start of a file, and check it against the bytes that follow before anything is
+   allocated. */
 static gbt_status take_count(cursor *c, size_t record_bytes, const char *what, uint64_t *count,
                              gbt_error *err)
 {

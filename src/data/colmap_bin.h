@@ -10,8 +10,8 @@
  *
  * @param out [in,out] zeroed by the caller; free with raw_free(), also after a failure
  * @return GBT_OK, GBT_ERR_FORMAT with the offset, GBT_ERR_NO_MEMORY
- * Threads: any. Cost: one pass; memory is bounded by a small multiple of the bytes given, whatever the counts
- * in them say.
+ * Threads: any. Cost: one pass; memory is at most a small multiple of the file size, even if the counts in
+ * the file are wrong.
  */
 gbt_status colmap_bin_read(const colmap_files *files, raw_scene *out, gbt_error *err);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_model.h -- what COLMAP's binary and text readers share: cameras by id, poses, and the finish
-   that ties images to cameras. */
+/* data/colmap_model.h -- shared by COLMAP's binary and text readers: looking up cameras and images by id, and
+   checking and adding images. */
 #ifndef GBT_DATA_COLMAP_MODEL_H
 #define GBT_DATA_COLMAP_MODEL_H
 
@@ -25,7 +25,7 @@ typedef struct colmap_cameras {
 gbt_status colmap_cameras_add(colmap_cameras *cameras, uint32_t id, const gbt_camera *camera, raw_place place,
                               gbt_error *err);
 
-/** Sort by id; a camera id that is there twice is an error. */
+/** Sort by id. A duplicate camera id is an error. */
 gbt_status colmap_cameras_sort(colmap_cameras *cameras, const char *file, gbt_error *err);
 void colmap_cameras_free(colmap_cameras *cameras);
 
@@ -43,12 +43,12 @@ typedef struct colmap_image_id {
     uint32_t view; /* index into raw_scene.views */
 } colmap_image_id;
 
-/** One entry per view, sorted by id, for looking up tracks. Owned by the caller (mem_free()); an id that is
-    there twice is an error. */
+/** Pairs of image id and view, sorted by id, to look up the images of tracks. Owned by the caller
+    (mem_free()). A duplicate id is an error. */
 gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images,
                                 gbt_error *err);
 
-/** As raw_add_sighting(), for a track's entry: the photo of image `id`, which is looked up in
+/** raw_add_sighting() for an entry of a track: the view is looked up by image id in the result of
     colmap_images_sorted(). */
 gbt_status colmap_add_sighting(raw_scene *raw, const colmap_image_id *images, uint32_t id,
                                const double position[3], gbt_error *err);

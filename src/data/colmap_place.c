@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_place.c -- the folders of COLMAP models, by the names of their files. */
+/* data/colmap_place.c -- finds the folder of a COLMAP model by the names of its files. */
 #include "data/colmap_place.h"
 
 #include <dirent.h>
@@ -11,11 +11,11 @@
 #include "base/file.h"
 #include "data/unposed.h"
 
-enum { PATH_SIZE = 4096, DEPTH = 3 /* of folders that are looked into: a/b/sparse/0 */ };
+enum { PATH_SIZE = 4096, DEPTH = 3 /* how many folder levels are searched: a/b/sparse/0 */ };
 
-/* ---- where it is looked for ---- */
+/* ---- the usual folders ---- */
 
-/* Which of the three files of a COLMAP model with this ending are there. */
+/* Count which of the model's three files exist with this ending. */
 static gbt_status count_model_files(const char *folder, const char *ending, int *count, gbt_error *err)
 {
     static const char *const names[3] = {"cameras", "images", "points3D"};
@@ -48,7 +48,7 @@ gbt_status colmap_place_find(const char *folder, colmap_layout layout, char *mod
     return GBT_OK;
 }
 
-/* ---- elsewhere ---- */
+/* ---- other folders, for the error message ---- */
 
 static bool holds_model(const char *folder)
 {
@@ -57,7 +57,7 @@ static bool holds_model(const char *folder)
            count_model_files(folder, "txt", &text, NULL) == GBT_OK && (binary == 3 || text == 3);
 }
 
-/* The first by its name of the folders `sparse`, or folders in one, that hold a model. */
+/* Among all folders named `sparse`, and folders directly inside one, that hold a model: the first by name. */
 static void find_elsewhere(const char *folder, bool is_sparse, int depth, char best[PATH_SIZE])
 {
     DIR *entries = opendir(folder);
@@ -79,7 +79,7 @@ static void find_elsewhere(const char *folder, bool is_sparse, int depth, char b
     closedir(entries);
 }
 
-/* What a model's folder is called in the data set that it is of; false: there are no photos in that. */
+/* The data set folder that a model folder belongs to; false when that has no photos. */
 static bool find_data_set(const char *model, const char *ending, char out[PATH_SIZE])
 {
     const size_t length = strlen(model), cut = strlen(ending);

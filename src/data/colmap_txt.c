@@ -133,8 +133,8 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
     return colmap_cameras_sort(cameras, file->name, err);
 }
 
-/* The second line of an image: X Y POINT3D_ID triples, possibly none. Checked, because a shifted line shows
-   up here, and not kept. */
+/* The second line of an image: (X, Y, POINT3D_ID) triples, possibly none. They are not kept, but checked,
+   because a missing or extra line shows up here. */
 static gbt_status check_observations(text_lines *lines, gbt_error *err)
 {
     const char *token;

@@ -5,8 +5,8 @@
 
 #include "data/colmap_model.h"
 
-/** The text twin of colmap_bin_read(): same results, same checks, lines in messages. LF or CRLF, with or
-    without a BOM. */
+/** The same results and checks as colmap_bin_read(); messages give line numbers. Line ends may be LF or CRLF,
+    and a byte order mark is allowed. */
 gbt_status colmap_txt_read(const colmap_files *files, raw_scene *out, gbt_error *err);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_write.c -- COLMAP models from structs, in the binary form. */
+/* data/colmap_write.c -- writes binary COLMAP models. */
 #include "data/colmap_write.h"
 
 #include <math.h>
@@ -46,7 +46,7 @@ static gbt_status check_image(const model *m, size_t i, gbt_error *err)
     return GBT_OK;
 }
 
-/* Check everything that is an index, and give each image its camera id. */
+/* Check all indices, and give each image its camera id. */
 static gbt_status prepare(model *m, gbt_error *err)
 {
     if (m->image_count >= UINT32_MAX)
@@ -73,8 +73,8 @@ static gbt_status prepare(model *m, gbt_error *err)
     return GBT_OK;
 }
 
-/* Is image `i` the first that uses its camera? Ids are given in order, so it is when no id before it is as
-   large. */
+/* Whether image `i` is the first with its camera. Camera ids are assigned in image order, so a new camera
+   always has a larger id than all before; `seen` is the largest so far. */
 static bool is_first_use(const model *m, size_t i, uint32_t *seen)
 {
     const bool first = m->camera_ids[i] > *seen;
@@ -91,7 +91,7 @@ static size_t camera_count(const model *m)
     return seen;
 }
 
-/* Unit quaternion w x y z, w >= 0, and translation -R c. */
+/* COLMAP's pose: unit quaternion w x y z with w >= 0, and translation -R c. */
 static void pose_of(const gbt_camera *camera, double q[4], double t[3])
 {
     const double *m = camera->rotation;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/colmap_write.h -- COLMAP models from structs, in the binary form. */
+/* data/colmap_write.h -- writes binary COLMAP models. */
 #ifndef GBT_DATA_COLMAP_WRITE_H
 #define GBT_DATA_COLMAP_WRITE_H
 
@@ -17,7 +17,7 @@ typedef struct colmap_point {
     const uint32_t *track; /* [track_count][2]: image index (from 0), observation index within that image */
 } colmap_point;
 
-/** `point` of an observation that belongs to no point. */
+/** Value of `point` for an observation without a 3D point. */
 #define COLMAP_NO_POINT UINT64_MAX
 
 typedef struct colmap_observation {
@@ -33,10 +33,10 @@ typedef struct colmap_image {
 } colmap_image;
 
 /**
- * Write folder/cameras.bin, images.bin and points3D.bin; the folder is made when it is not there. Everything
- * is borrowed.
+ * Write folder/cameras.bin, images.bin and points3D.bin; the folder is created if missing. All arguments are
+ * borrowed.
  *
- * Ids are indices plus one; images with the same model, size and parameters share one camera id.
+ * Ids are indices plus one. Images with the same model, size and parameters share one camera id.
  *
  * @return GBT_OK; GBT_ERR_ARGUMENT for a bad name, camera or index; else as file_write_atomic()
  */

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/compressed_ply.c -- .ply with 256 Gaussians to a chunk: a chunk has the least and the largest
-   position, log-scale and colour, and each Gaussian four 32-bit words of shares between them. */
+/* data/compressed_ply.c -- reads and writes compressed .ply files, as SuperSplat defines them.
+
+   Gaussians are stored in chunks of 256. A chunk holds the minimum and maximum of positions, log-scales and
+   colours. A Gaussian is four 32-bit words: position, rotation, log-scale, and colour with opacity; all but
+   the rotation are quantized between the chunk's minimum and maximum. */
 #include "data/compressed_ply.h"
 
 #include <math.h>
@@ -18,9 +21,9 @@ enum {
     REST_MAX = 3 * (GAUSSIAN_SH_COUNT - 1)
 };
 
-static const double scale_limit = 20; /* of logs, as other programs write them */
-static const double rest_range = 8;   /* harmonics within +-4 in 256 steps */
-static const int bits[GROUPS][3] = {{11, 10, 11}, {11, 10, 11}, {8, 8, 8}}; /* of each axis, highest first */
+static const double scale_limit = 20; /* log-scales are clamped to +-20, as other programs do */
+static const double rest_range = 8;   /* higher-degree SH coefficients within +-4, in 256 steps */
+static const int bits[GROUPS][3] = {{11, 10, 11}, {11, 10, 11}, {8, 8, 8}}; /* highest bits first */
 
 static const char *const chunk_names[CHUNK_COLUMNS] = {
     "min_x",       "min_y",       "min_z",       "max_x",       "max_y",       "max_z",
@@ -29,7 +32,7 @@ static const char *const chunk_names[CHUNK_COLUMNS] = {
 static const char *const vertex_names[VERTEX_COLUMNS] = {"packed_position", "packed_rotation", "packed_scale",
                                                          "packed_color"};
 
-/* ---- one Gaussian ---- */
+/* ---- packing one Gaussian ---- */
 
 static uint32_t share(double value, double low, double high, int bit_count)
 {
@@ -37,7 +40,8 @@ static uint32_t share(double value, double low, double high, int bit_count)
     return high > low ? (uint32_t)nearbyint(fmin(fmax((value - low) / (high - low), 0), 1) * levels) : 0;
 }
 
-/* The largest of four components is left out, and positive: 2 bits say which, then 10 for each other. */
+/* Smallest-three encoding: the component with the largest magnitude is made positive and dropped; 2 bits give
+   its index, 10 bits each of the others. */
 static uint32_t pack_rotation(const float q[4])
 {
     int largest = 0;
@@ -66,10 +70,10 @@ static void unpack_rotation(uint32_t word, double q[4])
     q[missing] = sqrt(fmax(0, 1 - square));
 }
 
-/* Position, log-scale or colour, by the chunk's least and largest. */
+/* Unpack a position, log-scale or colour, which is quantized between the chunk's minimum and maximum. */
 static void unpack_group(uint32_t word, int group, const float *chunk, double out[3])
 {
-    int shift = 32; /* below a colour are 8 bits of opacity */
+    int shift = 32; /* 32 bits in all; the 8 bits below a colour are the opacity */
     for (int k = 0; k < 3; k++) {
         const int count = bits[group][k];
         shift -= count;
@@ -196,8 +200,8 @@ typedef struct packed {
     float *chunks;         /* [chunk_count][CHUNK_COLUMNS] */
     uint32_t *words;       /* [count][VERTEX_COLUMNS] */
     unsigned char *rest;   /* [count][rest_count] */
-    size_t at, rest_count; /* rows taken; harmonics of a Gaussian */
-    bool has_color;        /* chunks of older files have none: 0 to 1 */
+    size_t at, rest_count; /* next row to fill; SH coefficients above degree 0 of a Gaussian, all channels */
+    bool has_color;        /* older files have no colour range in their chunks: it is 0 to 1 */
 } packed;
 
 static void add_chunk(void *context, const double *values)
@@ -224,7 +228,7 @@ static void add_rest(void *context, const double *values)
     p->at++;
 }
 
-/* Columns by their names; GBT_ERR_FORMAT where one is missing, or is a list. */
+/* Look up columns by name. GBT_ERR_FORMAT when one is missing or is a list. */
 static gbt_status find_columns(const source_file *file, const ply_header *header, int element,
                                const char *const *names, size_t count, int *columns, gbt_error *err)
 {
@@ -294,7 +298,7 @@ static gbt_status read_rest(packed *p, const ply_header *header, size_t count, g
     return ply_read_rows(p->file, header, element, columns, rest, add_rest, p, err);
 }
 
-/* The middle of a step; the first and the last step mean the ends of the range. */
+/* Dequantize to the middle of the step, except that 0 and 255 give the ends of the range. */
 static double rest_of(unsigned char byte)
 {
     const double level = byte == 0 ? 0 : byte == 255 ? 1 : ((double)byte + 0.5) / 256;
@@ -329,7 +333,7 @@ gbt_status compressed_ply_read(const source_file *file, const ply_header *header
                                gbt_error *err)
 {
     const uint64_t count = header->elements[ply_find_element(header, "vertex")].count;
-    /* A column takes at least a byte: that bounds the memory by a multiple of the file. */
+    /* Every column takes at least one byte, so memory is bounded by a multiple of the file size. */
     if (count > (file->size - header->data_at) / VERTEX_COLUMNS)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
                          file->name, header->data_at, (unsigned long long)count,
@@ -342,7 +346,7 @@ gbt_status compressed_ply_read(const source_file *file, const ply_header *header
         status = read_rest(&p, header, (size_t)count, err);
     if (status == GBT_OK)
         status = gaussian_cloud_alloc(out, (size_t)count, err);
-    out->count = 0; /* of rows that are usable */
+    out->count = 0; /* counts the usable rows from here on */
     out->sh_degree = p.rest_count == 45 ? 3 : p.rest_count == 24 ? 2 : p.rest_count == 9 ? 1 : 0;
     for (size_t i = 0; i < count && status == GBT_OK; i++) {
         gaussian_row row = {0};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_cloud.c -- memory of plain Gaussians. */
+/* data/gaussian_cloud.c -- allocates, checks and normalises plain Gaussians. */
 #include "data/gaussian_cloud.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "base/memory.h"
 #include "data/raw.h"
 
-#define VALUE_LIMIT 1e18 /* squares of anything below are floats */
+#define VALUE_LIMIT 1e18 /* values up to this have squares that fit a float */
 
 gbt_status gaussian_cloud_alloc(gaussian_cloud *cloud, size_t count, gbt_error *err)
 {

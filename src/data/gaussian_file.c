@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_file.c -- formats of plain Gaussians by the ending of a name. */
+/* data/gaussian_file.c -- reads and writes plain Gaussians in the format that the file's ending names. */
 #include "data/gaussian_file.h"
 
 #include <float.h>
@@ -31,7 +31,7 @@ gbt_export_format gbt_export_format_at(int index)
     return (gbt_export_format){.ending = f->ending, .what = f->what};
 }
 
-/* ".ply, .splat or .glb" */
+/* The readable or writable endings as a sentence: ".ply, .splat or .glb". */
 static const char *list(const char *before_last, char out[LIST_SIZE])
 {
     size_t used = 0;
@@ -45,7 +45,7 @@ static const char *list(const char *before_last, char out[LIST_SIZE])
     return out;
 }
 
-/* The longest ending that fits: .compressed.ply ends in .ply too. */
+/* The longest matching ending wins, because .compressed.ply also ends in .ply. */
 static const gaussian_format *format_of(const char *path)
 {
     const gaussian_format *found = NULL;
@@ -56,7 +56,7 @@ static const gaussian_format *format_of(const char *path)
     return found;
 }
 
-/* Of .usd and .usdc the reader of text says whether they are binary. */
+/* .usd and .usdc go to the text reader, which tells a binary file from text and reports it. */
 static const gaussian_format *format_read_as(const char *path)
 {
     const char *ending = strrchr(path, '.');
@@ -65,7 +65,7 @@ static const gaussian_format *format_read_as(const char *path)
     return format_of(path);
 }
 
-/* The file itself, or the newest one of a result folder; NULL when there is none that can be read. */
+/* The file itself, or the newest .ply of a result folder. NULL when nothing there can be read. */
 static const char *find_file(const char *path, result_folder *folder)
 {
     bool found;
@@ -131,7 +131,7 @@ int gaussian_file_degree(const char *path)
     return format != NULL ? format->degree : 3;
 }
 
-/* A warning when floats of the world's coordinates have steps that are large beside the Gaussians. */
+/* Warn when world coordinates as floats have steps that are large compared with the Gaussians. */
 static gbt_status check_precision(const char *path, const gaussian_cloud *cloud, const double origin[3],
                                   gbt_error *err)
 {

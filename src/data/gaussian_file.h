@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_file.h -- plain Gaussians in whatever file people have: the format follows from the name. */
+/* data/gaussian_file.h -- plain Gaussians in any of the supported formats, chosen by the ending of the file
+   name. */
 #ifndef GBT_DATA_GAUSSIAN_FILE_H
 #define GBT_DATA_GAUSSIAN_FILE_H
 
@@ -7,26 +8,28 @@
 
 #include "data/gaussian_cloud.h"
 
-/** Whether gaussian_file_read() takes it: a name with the ending of a format
-    (data/gaussian_formats.h), .usd or .usdc, or a result folder of 3DGS (data/result_folder.h). */
+/** Whether gaussian_file_read() accepts the path: its ending is one of the formats'
+    (data/gaussian_formats.h), .usd or .usdc, or it is a 3DGS result folder (data/result_folder.h). */
 bool gaussian_file_readable(const char *path);
 
-/** gaussian_file_readable(), and a .ply is not a cloud of points or of another program's anchors: its header
-    is looked at. */
+/** Like gaussian_file_readable(), but also looks at the header of a .ply: false for a point cloud or another
+    program's anchors. */
 bool gaussian_file_has_gaussians(const char *path);
 
-/** Read a file, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything
-   else; else as its reader. Free with gaussian_cloud_free(). */
+/** Read a file, or the newest .ply of a result folder. GBT_ERR_ARGUMENT for anything else; other errors as
+    the format's reader. Free with gaussian_cloud_free(). */
 gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error *err);
 
-/** GBT_ERR_ARGUMENT unless the name has the ending of a format: before any work is done. */
+/** GBT_ERR_ARGUMENT unless the name has the ending of a writable format; to be called before any work is
+    done. */
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err);
 
-/** The largest degree of colours that the format keeps: 0 for .splat, else 3. */
+/** The highest SH degree that the format stores: 0 for .splat, else 3. */
 int gaussian_file_degree(const char *path);
 
-/** Write one of these, atomically; `origin` and the cloud's own are added to every mean in double, or kept
-   apart (gaussian_format.keeps_origin). A warning where floats are too coarse for that. As its writer. */
+/** Write atomically in the format of the ending. `origin` and the cloud's own origin are added to every mean
+    in double, or stored separately (gaussian_format.keeps_origin). Warns when floats are too coarse for the
+    coordinates. Errors as the format's writer. */
 gbt_status gaussian_file_write(const char *path, const gaussian_cloud *cloud, const double origin[3],
                                gbt_error *err);
 

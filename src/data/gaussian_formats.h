@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_formats.h -- the formats of plain Gaussians: THE list. A new one is a file that defines its
-   row, and its name here. */
+/* data/gaussian_formats.h -- the list of all formats of plain Gaussians. To add one, write a file that
+   defines its row and add the row's name here. */
 #ifndef GBT_DATA_GAUSSIAN_FORMATS_H
 #define GBT_DATA_GAUSSIAN_FORMATS_H
 
@@ -8,18 +8,20 @@
 #include "data/gaussian_cloud.h"
 
 typedef struct gaussian_format {
-    const char *ending; /* of file names; in any case */
-    const char *what;   /* what it keeps, in a few words, for help and pages */
-    int degree;         /* of the colours it keeps */
-    bool keeps_origin;  /* apart from the means, in double */
+    const char *ending; /* of file names, ignoring case */
+    const char *what;   /* what the format keeps, in a few words, for the help text and the documentation */
+    int degree;         /* highest SH degree that it keeps */
+    bool keeps_origin;  /* stored separately from the means, in double */
 
-    /** Free the cloud with gaussian_cloud_free(); zeroed on failure. */
+    /** The caller frees the cloud with gaussian_cloud_free(); zeroed on failure. */
     gbt_status (*read)(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
-    /** Are there Gaussians in such a file? NULL: in every one. */
+    /** Whether such a file contains Gaussians at all. NULL: always. */
     bool (*holds)(const source_file *file);
 
-    /** Write one atomically; `origin` is added to every mean in double, or kept apart. The cloud's own is 0.
+    /**
+     * Write atomically. `origin` is added to every mean in double, or stored separately; the cloud's own
+     * origin is 0 here.
      */
     gbt_status (*write)(const char *path, const gaussian_cloud *cloud, const double origin[3],
                         gbt_error *err);

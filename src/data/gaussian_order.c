@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_order.c -- shells around the middle, and Morton codes within. */
+/* data/gaussian_order.c -- sorts Gaussians into nested boxes around the centre, and by Morton code within
+   each. */
 #include "data/gaussian_order.h"
 
 #include <math.h>

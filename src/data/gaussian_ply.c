@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_ply.c -- plain 3DGS models from bytes. */
+/* data/gaussian_ply.c -- reads plain 3DGS models (.ply). */
 #include "data/gaussian_ply.h"
 
 #include <math.h>
@@ -22,11 +22,11 @@ enum {
 typedef struct gaussian_rows {
     gaussian_cloud *out;
     size_t rest_count; /* f_rest properties: 0, 9, 24 or 45 */
-    bool has_filter;   /* filter_3D is behind them */
+    bool has_filter;   /* filter_3D is the column after them */
 } gaussian_rows;
 
-/* Wider by `filter` along each axis, and as much less opaque: the 3D smoothing filter of Yu 2024, which its
-   files have beside what it acts on. */
+/* Apply the 3D smoothing filter of Mip-Splatting (Yu 2024): widen each axis and lower the opacity in
+   proportion. The files store the filter size next to the unfiltered Gaussian. */
 static void widen(gaussian_row *row, double filter)
 {
     for (int k = 0; k < 3 && filter != 0; k++) {
@@ -55,7 +55,7 @@ static void add_row(void *context, const double *values)
     gaussian_cloud_add(rows->out, &row);
 }
 
-/* Property indices of the columns; says what is missing. */
+/* Find the column index of each property; the error message names what is missing. */
 static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex, int *columns,
                                size_t *rest_count, bool *has_filter, gbt_error *err)
 {
@@ -118,20 +118,20 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
     int columns[PLY_MAX_COLUMNS + 1];
     gaussian_rows rows = {.out = out};
     GBT_TRY(find_columns(file, header, vertex, columns, &rows.rest_count, &rows.has_filter, err));
-    /* A column takes at least a byte, so this bounds the memory by a small multiple of the file. */
+    /* Every column takes at least one byte, so memory is bounded by a small multiple of the file size. */
     const uint64_t row_count = header->elements[vertex].count, least_bytes = FIXED_COLUMNS + rows.rest_count;
     if (row_count > (file->size - header->data_at) / least_bytes)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
                          file->name, header->data_at, (unsigned long long)row_count,
                          file->size - header->data_at);
     GBT_TRY(gaussian_cloud_alloc(out, (size_t)row_count, err));
-    out->count = 0; /* of rows that are usable */
+    out->count = 0; /* counts the usable rows from here on */
     out->sh_degree = degree_of(rows.rest_count);
     return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count + rows.has_filter,
                          add_row, &rows, err);
 }
 
-/* 0 where nobody says, or no usable distance. */
+/* The near distance from the header comment; 0 when it is missing or unusable. */
 static float near_of(const source_file *file, const ply_header *header)
 {
     static const char mark[] = "\n" GAUSSIAN_PLY_NEAR;
@@ -147,7 +147,7 @@ static float near_of(const source_file *file, const ply_header *header)
     return number_parse_double(text, length, &near) == NUMBER_OK ? gaussian_cloud_near(near) : 0;
 }
 
-/* A line of the header; a later one would count, but nobody writes two. */
+/* Whether the header contains this text. */
 static bool says(const source_file *file, const ply_header *header, const char *line)
 {
     return memmem(file->bytes, header->data_at, line, strlen(line)) != NULL;
@@ -184,7 +184,7 @@ bool gaussian_ply_has_gaussians(const source_file *file)
                                           ply_find_property(&header, vertex, "rot_0") >= 0);
 }
 
-/* ---- by parts ---- */
+/* ---- reading in parts ---- */
 
 static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_error *err)
 {
@@ -248,7 +248,7 @@ gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size
     const size_t size = count * parts->row_bytes;
     GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes,
                             size, err));
-    /* These rows as a file of their own. */
+    /* Present these rows as a file of their own. */
     ply_header header = parts->header;
     header.element_count = 1;
     header.elements[0].count = count;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/gaussian_ply_write.c -- plain 3DGS models as the .ply that every viewer reads. */
+/* data/gaussian_ply_write.c -- writes plain 3DGS models as the .ply that every viewer reads. */
 #include <math.h>
 #include <stdio.h>
 
@@ -8,7 +8,7 @@
 #include "data/gaussian_formats.h"
 #include "data/gaussian_ply.h"
 
-/* The inverse of the sigmoid; 0 and 1 are as near as a float's sigmoid comes. */
+/* The inverse of the sigmoid. 0 and 1 give finite logits whose sigmoid in float is as close as possible. */
 static double logit(double opacity)
 {
     const double p = fmin(fmax(opacity, 1e-7), 1 - 1e-7);
@@ -25,8 +25,8 @@ static void put_properties(sink *s, const char *stem, size_t count)
 }
 
 /*
- * Write one as the reference implementation does: binary, normals of 0, f_rest channel-major, opacity as a
- * logit, scales as logs.
+ * Write a file as the 3DGS reference implementation does: binary, normals of 0, f_rest channel-major, opacity
+ * as a logit, scales as logs.
  *
  * @param origin [in] added to every mean in double
  */
@@ -41,7 +41,8 @@ static gbt_status write_ply(const char *path, const gaussian_cloud *cloud, const
         sink_put_text(&s, GAUSSIAN_PLY_MIP "\n");
     snprintf(line, sizeof line, "element vertex %zu\n", cloud->count);
     sink_put_text(&s, line);
-    gaussian_ply_put_near(&s, cloud); /* here: the viewer of 3DGS wants the count in the third line */
+    gaussian_ply_put_near(&s, cloud); /* after the count, because the viewer of 3DGS expects that in the third
+                                         line */
     sink_put_text(&s, "property float x\nproperty float y\nproperty float z\nproperty float nx\nproperty "
                       "float ny\nproperty float nz\n");
     put_properties(&s, "f_dc_", 3);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/glb.h -- what the writer and the reader of .glb share: numbers of binary glTF 2.0. */
+/* data/glb.h -- constants of binary glTF 2.0, shared by the reader and the writer of .glb. */
 #ifndef GBT_DATA_GLB_H
 #define GBT_DATA_GLB_H
 
@@ -8,7 +8,7 @@
 
 enum {
     GLB_MAGIC = 0x46546C67,
-    GLB_JSON = 0x4E4F534A, /* chunks */
+    GLB_JSON = 0x4E4F534A, /* chunk types */
     GLB_BINARY = 0x004E4942,
     GLB_BYTE = 5120, /* componentType */
     GLB_UBYTE = 5121,
@@ -18,11 +18,11 @@ enum {
     GLB_POINTS = 0 /* mode */
 };
 
-/** The near distance, a number in the `extras` of `asset`, which are for what others need not know. */
+/** The near distance: our own number in `extras` of `asset`, which glTF reserves for application data. */
 #define GLB_NEAR "gbtrace_near"
 
-/** The first primitive with KHR_gaussian_splatting, neither compressed nor sparse; the translation of its
-   node becomes the origin. */
+/** Read the first primitive with KHR_gaussian_splatting; compressed or sparse data is an error. The
+    translation of its node becomes the origin. */
 gbt_status glb_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
 #endif

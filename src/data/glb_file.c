@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/glb_file.c -- glTF's JSON chunk and its binary chunk: one array after the other, each an accessor. */
+/* data/glb_file.c -- writes .glb: the JSON chunk, and a binary chunk with one array (one accessor) after the
+   other. */
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -15,7 +16,7 @@ typedef struct glb {
     size_t count;
 } glb;
 
-/* What was put into the binary chunk since `from` is an attribute. */
+/* Declare the bytes appended to the binary chunk since `from` as an attribute. */
 static json_t *add_attribute(glb *g, const char *name, const char *type, int component, size_t from)
 {
     json_t *accessor = json_pack("{s:i,s:i,s:I,s:s}", "bufferView", (int)json_array_size(g->views),
@@ -38,8 +39,8 @@ static void put_positions(glb *g, const gaussian_cloud *cloud)
         sink_put_f32(&g->data, turned);
     }
     json_t *accessor = add_attribute(g, "POSITION", "VEC3", GLB_FLOAT, from);
-    json_object_set_new(accessor, "min", json_pack("[f,f,f]", low[0], low[1], low[2])); /* glTF wants them,
-                                                                                           exactly */
+    json_object_set_new(accessor, "min", json_pack("[f,f,f]", low[0], low[1], low[2])); /* glTF wants exact
+                                                                                           bounds */
     json_object_set_new(accessor, "max", json_pack("[f,f,f]", high[0], high[1], high[2]));
 }
 
@@ -61,7 +62,7 @@ static void put_shape(glb *g, const gaussian_cloud *cloud)
     }
     json_object_set_new(add_attribute(g, "COLOR_0", "VEC4", GLB_UBYTE, from), "normalized", json_true());
     from = s->size;
-    for (size_t i = 0; i < cloud->count; i++) { /* w x y z becomes x y z w */
+    for (size_t i = 0; i < cloud->count; i++) { /* from w x y z to glTF's x y z w */
         const float *q = cloud->quat + 4 * i;
         const float norm = sqrtf(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
         const float turned[4] = {-q[1], -q[2], q[3], q[0]};
@@ -79,7 +80,7 @@ static void put_shape(glb *g, const gaussian_cloud *cloud)
     add_attribute(g, "KHR_gaussian_splatting:OPACITY", "SCALAR", GLB_FLOAT, from);
 }
 
-/* Half a turn about z: every second function in the files' order changes its sign. */
+/* Half a turn about z changes the sign of every second SH function, in the order that files have them. */
 static void put_harmonics(glb *g, const gaussian_cloud *cloud)
 {
     for (size_t k = 0, degree = 0; degree <= (size_t)cloud->sh_degree; degree++)
@@ -96,7 +97,7 @@ static void put_harmonics(glb *g, const gaussian_cloud *cloud)
         }
 }
 
-/* The origin is the node's place, where numbers are doubles. */
+/* The origin becomes the node's translation, which is stored in double. */
 static json_t *document(const glb *g, const gaussian_cloud *cloud, const double origin[3])
 {
     json_t *primitive =
@@ -139,12 +140,12 @@ static gbt_status write_chunks(const char *path, const glb *g, const char *json,
 }
 
 /*
- * Write one. glTF's y is up and cameras' y is down: x and y change their signs, and rotations and spherical
- * harmonics with them.
+ * Write a .glb. In glTF y points up, in our scenes down, so the scene is turned by 180 degrees about z: x and
+ * y change sign, and rotations and spherical harmonics follow.
  *
- * Viewers without the extension see points: COLOR_0 holds the mean colour, linear, with the opacity.
+ * Viewers without the extension show points: COLOR_0 holds the mean colour (linear) and the opacity.
  *
- * @param origin [in] the node's translation
+ * @param origin [in] becomes the node's translation
  * @return GBT_OK; GBT_ERR_ARGUMENT (beyond 4 GiB); GBT_ERR_NO_MEMORY; as file_write_atomic()
  */
 static gbt_status write_glb(const char *path, const gaussian_cloud *cloud, const double origin[3],

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/glb_read.c -- glTF's JSON chunk and binary chunk to Gaussians: the first primitive that has them. */
+/* data/glb_read.c -- reads .glb: the first primitive with Gaussians, from the JSON chunk and the binary
+   chunk. */
 #include "data/glb.h"
 
 #include <jansson.h>
@@ -10,7 +11,7 @@ typedef struct reading {
     const source_file *file;
     json_t *root;
     const json_t *attributes;
-    cursor data; /* over the whole file, at the binary chunk's first byte */
+    cursor data; /* covers the whole file and stands at the first byte of the binary chunk */
     size_t data_size, count;
 } reading;
 
@@ -26,7 +27,7 @@ static gbt_status read_chunks(reading *r, gbt_error *err)
     const uint32_t magic = cursor_u32(&c), version = cursor_u32(&c);
     if (magic != GLB_MAGIC || version != 2)
         return wrong(r, "no binary glTF 2.0", err);
-    cursor_u32(&c); /* the whole length */
+    cursor_u32(&c); /* skip the total length */
     const uint32_t json_size = cursor_u32(&c);
     if (cursor_u32(&c) != GLB_JSON)
         return wrong(r, "the first chunk is not JSON", err);
@@ -46,9 +47,9 @@ static gbt_status read_chunks(reading *r, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- where the Gaussians are ---- */
+/* ---- finding the Gaussians ---- */
 
-/* The mesh that has them, and their attributes. */
+/* The mesh with the first such primitive, and the attributes of that primitive. */
 static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
 {
     const json_t *mesh, *primitive;
@@ -74,7 +75,7 @@ static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
     return wrong(r, "no primitive with KHR_gaussian_splatting", err);
 }
 
-/* Whether numbers are there, and are others than these. */
+/* Whether the node has this array of numbers, with values other than `wanted`. */
 static bool is_not(const json_t *node, const char *key, const double *wanted, size_t count)
 {
     const json_t *numbers = json_object_get(node, key);
@@ -84,7 +85,7 @@ static bool is_not(const json_t *node, const char *key, const double *wanted, si
     return false;
 }
 
-/* By more than a translation. */
+/* Whether the node has a transformation other than a translation. */
 static bool is_placed(const json_t *node)
 {
     static const double matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
@@ -99,7 +100,7 @@ static bool has_mesh(const json_t *node, size_t mesh_index)
     return json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
 }
 
-/* The mesh's nodes, and those that they are in. `parent` starts as [count] zeros. */
+/* Mark the nodes of the mesh, and all their ancestors, in `matters`. `parent` starts as [count] zeros. */
 static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, bool *matters)
 {
     const size_t count = json_array_size(nodes);
@@ -111,7 +112,7 @@ static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, b
         {
             const json_int_t index = json_is_integer(child) ? json_integer_value(child) : -1;
             if (index >= 0 && (uint64_t)index < count)
-                parent[index] = i + 1; /* 0: none */
+                parent[index] = i + 1; /* one more than the index; 0: no parent */
         }
     }
     json_array_foreach(nodes, i, node)
@@ -121,8 +122,8 @@ static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, b
     }
 }
 
-/* The translation of the mesh's node, which is the cloud's origin. Its other transformations, and those of
-   nodes that it is in, are not read; what is in neither are cameras, lights and the like. */
+/* The translation of the mesh's node becomes the cloud's origin. Any other transformation of that node or its
+   ancestors is an error; other nodes (cameras, lights and so on) are ignored. */
 static gbt_status place_of(const reading *r, const json_t *nodes, const bool *matters, size_t mesh_index,
                            double place[3], gbt_error *err)
 {
@@ -162,8 +163,8 @@ static gbt_status read_place(const reading *r, size_t mesh_index, double place[3
 /* ---- attributes ---- */
 
 typedef struct column {
-    size_t from, stride; /* bytes, in the binary chunk */
-    size_t width;        /* bytes of one number */
+    size_t from, stride; /* bytes; `from` is an offset in the binary chunk */
+    size_t width;        /* bytes of one component */
     int type;            /* glTF's componentType */
 } column;
 
@@ -183,7 +184,7 @@ static size_t width_of(int type)
     }
 }
 
-/* A whole number of an object in [0, 2^40]; `missing` when it is not there, SIZE_MAX for anything else. */
+/* An integer field in [0, 2^40]; `missing` when it is absent, SIZE_MAX when it is anything else. */
 static size_t whole(const json_t *object, const char *key, size_t missing)
 {
     const json_t *value = json_object_get(object, key);
@@ -225,7 +226,7 @@ static gbt_status find_column(reading *r, const char *name, const char *kind, si
     return GBT_OK;
 }
 
-/* Whole numbers stand for [0, 1] or [-1, 1]. */
+/* Integers are normalised: they stand for [0, 1] or [-1, 1]. */
 static double number(const reading *r, const column *c, size_t i, size_t k)
 {
     cursor at = r->data;
@@ -267,7 +268,7 @@ static gbt_status find_columns(reading *r, columns *c, int *degree, gbt_error *e
     return GBT_OK;
 }
 
-/* Half a turn about z, as the writer does. */
+/* Add Gaussian i, turned by 180 degrees about z as in the writer. */
 static void take(const reading *r, const columns *c, size_t i, gaussian_cloud *out)
 {
     gaussian_row row = {.opacity = number(r, &c->opacity, i, 0)};

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/json_fields.c -- the fields of a JSON file, checked one by one. */
+/* data/json_fields.c -- reads and checks the fields of a JSON file one by one. */
 #include "data/json_fields.h"
 
 #include <math.h>

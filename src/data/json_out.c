@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/json_out.c -- finished JSON to a stream or a file. */
+/* data/json_out.c -- writes JSON to a stream or a file. */
 #include "data/json_out.h"
 
 #include <math.h>
@@ -10,7 +10,8 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-/* 9 digits tell two floats apart, 12 keep a world origin to a micrometre in a city. */
+/* 9 digits are enough to tell any two floats apart; 12 digits keep world coordinates within a city to a
+   micrometre. */
 enum { JSON_STYLE = JSON_INDENT(2) | JSON_REAL_PRECISION(12) };
 
 json_t *json_text(const char *text)
@@ -59,7 +60,7 @@ gbt_status json_save(const json_t *value, const char *path, gbt_error *err)
     if (text == NULL)
         return GBT_ERR_NO_MEMORY;
     const size_t length = strlen(text);
-    text[length] = '\n'; /* in place of the final zero, which nobody reads any more */
+    text[length] = '\n'; /* overwrites the terminating zero, which is not needed any more */
     const gbt_status status = file_write_atomic(path, text, length + 1, err);
     free(text);
     return status;

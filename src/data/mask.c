@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/mask.c -- masks and alpha channels to marks of pixels. */
+/* data/mask.c -- turns masks and alpha channels into arrays of valid pixels. */
 #include "data/mask.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include "base/memory.h"
 #include "data/photo_size.h"
 
-/* valid = valid and marks; `marks` is taken over or freed. */
+/* valid = valid and marks. Takes ownership of `marks`. */
 static void combine(unsigned char *marks, size_t count, unsigned char **valid)
 {
     if (*valid == NULL) {
@@ -21,7 +21,7 @@ static void combine(unsigned char *marks, size_t count, unsigned char **valid)
     mem_free(marks);
 }
 
-/* Of a pixel of 3 or 4 channels. */
+/* A value of one pixel, which has 3 or 4 channels. */
 typedef float (*pixel_value)(const float *pixel, size_t channels);
 
 static float opacity(const float *pixel, size_t channels)
@@ -29,13 +29,13 @@ static float opacity(const float *pixel, size_t channels)
     return channels < 4 ? 1 : fminf(fmaxf(pixel[3], 0), 1);
 }
 
-/* Masks come in any colour, and as cut-outs. */
+/* Masks come in any colour, and as cut-outs with an alpha channel. */
 static float brightness(const float *pixel, size_t channels)
 {
     return fmaxf(pixel[0], fmaxf(pixel[1], pixel[2])) * opacity(pixel, channels);
 }
 
-/* 1 where `value` is at least `least`. */
+/* 1 where `value` of the pixel is at least `least`, else 0. */
 static gbt_status mark_pixels(const image *im, pixel_value value, float least, unsigned char **out,
                               gbt_error *err)
 {
@@ -54,7 +54,8 @@ static float half_of_largest(const image *im)
     float largest = 0;
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
         largest = fmaxf(largest, brightness(im->pixels + i * channels, channels));
-    return largest > 0 ? 0.5f * largest : 1; /* a black mask leaves nothing */
+    return largest > 0 ? 0.5f * largest
+                       : 1; /* the mask is black everywhere: no pixel reaches 1, so none is valid */
 }
 
 static gbt_status read_marks(const char *path, const image *photo, unsigned char **out, gbt_error *err)

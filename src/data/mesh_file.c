@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/mesh_file.c -- triangle meshes from OBJ and PLY bytes. */
+/* data/mesh_file.c -- reads triangle meshes from OBJ and PLY files in memory. */
 #include "data/mesh_file.h"
 
 #include <math.h>
@@ -24,8 +24,8 @@ static gbt_status add_vertex(mesh_data *out, const double position[3], raw_place
     return GBT_OK;
 }
 
-/* A polygon while its corners come in: from the third on, each makes a triangle with the first and the one
-   before. */
+/* Splits a polygon into triangles while its corners are read: from the third corner on, each makes a triangle
+   with the first and the previous corner. */
 typedef struct fan {
     size_t count;
     uint32_t first, last;
@@ -66,7 +66,7 @@ static gbt_status take_vertex(mesh_data *out, const char *at, const char *end, r
     return add_vertex(out, position, place, err);
 }
 
-/* "7", "-1/2", "3//4": the number before the first slash, as an index from 0. */
+/* A corner such as "7", "-1/2" or "3//4": the vertex number before the first slash, as an index from 0. */
 static gbt_status parse_corner(const mesh_data *mesh, const char *token, size_t length, raw_place place,
                                uint32_t *out, gbt_error *err)
 {
@@ -138,7 +138,8 @@ static gbt_status parse_obj(const source_file *file, mesh_data *out, gbt_error *
 typedef struct ply_mesh {
     mesh_data *out;
     raw_place place;
-    gbt_status status; /* of the first vertex that failed: rows of numbers cannot stop their reader */
+    gbt_status status; /* of the first vertex that failed, because a ply_row callback cannot stop the reader
+                        */
     gbt_error *err;
 } ply_mesh;
 

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/mesh_file.h -- triangle meshes from Wavefront OBJ and PLY files: positions and triangles, nothing
-   else. */
+/* data/mesh_file.h -- reads positions and triangles from Wavefront OBJ and PLY files. */
 #ifndef GBT_DATA_MESH_FILE_H
 #define GBT_DATA_MESH_FILE_H
 
@@ -18,8 +17,8 @@ typedef struct mesh_data {
  *
  * OBJ: `v` (what follows the first three numbers is not used) and `f` (corners as 1, 1/2, 1//3 or 1/2/3;
  * negative numbers count back from the last vertex so far); texture coordinates, normals, groups, materials,
- * lines and points are passed over; curves and surfaces, and anything else, are an error. PLY: x y z of
- * element vertex, and the list vertex_indices or vertex_index of element face.
+ * lines and points are ignored; curves, surfaces and anything else are an error. PLY: x y z of element
+ * vertex, and the list vertex_indices or vertex_index of element face.
  *
  * @param out [out] free with mesh_data_free() after success or failure; at least one triangle
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE:LINE: what was wrong"), GBT_ERR_NO_MEMORY
@@ -27,7 +26,7 @@ typedef struct mesh_data {
  */
 gbt_status mesh_file_read(const char *path, mesh_data *out, gbt_error *err);
 
-/** The same from bytes; `out` zeroed by the caller. */
+/** mesh_file_read() for a file in memory; the caller zeroes `out`. */
 gbt_status mesh_file_parse(const source_file *file, mesh_data *out, gbt_error *err);
 
 void mesh_data_free(mesh_data *mesh); /* zeroes the struct */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/number.c -- numbers from and to text. */
+/* data/number.c -- parses and formats numbers. */
 #include "data/number.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
-enum { TOKEN_LIMIT = 1024 }; /* the exact value of any double has fewer digits than this */
+enum { TOKEN_LIMIT = 1024 }; /* enough for the exact decimal value of any double */
 
 static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
@@ -40,7 +40,7 @@ static number_result parse_named(const char *text, size_t length, bool negative,
     return NUMBER_OK;
 }
 
-/* The slow way, for long or extreme numbers; the grammar is already checked. */
+/* The slow path, for long or extreme numbers. The syntax has already been checked. */
 static number_result parse_exactly(const char *text, size_t length, double *out)
 {
     char copy[TOKEN_LIMIT + 1];
@@ -97,7 +97,7 @@ number_result number_parse_double(const char *text, size_t length, double *out)
     }
     if (p != end)
         return NUMBER_BAD;
-    /* Both factors are exact doubles, so one rounding gives the correctly rounded quotient or product. */
+    /* Both factors are exact doubles, so the quotient or product is rounded once and therefore correctly. */
     if (used_digits <= 19 && mantissa <= (UINT64_C(1) << 53) && exponent >= -22 && exponent <= 22) {
         const double value =
             exponent < 0 ? (double)mantissa / powers[-exponent] : (double)mantissa * powers[exponent];

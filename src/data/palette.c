@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/palette.c -- cells with large errors are cut in two. */
+/* data/palette.c -- vector quantization: repeatedly split the cell with the largest error. */
 #include "data/palette.h"
 
 #include <math.h>
@@ -12,9 +12,9 @@
 
 enum { AXIS_STEPS = 6, WIDTH_MAX = 64 };
 
-/* ---- numbers ---- */
+/* ---- scalars ---- */
 
-/* How many of the sorted values are below one. */
+/* How many of the sorted values are below `value`. */
 static size_t count_below(const float *sorted, size_t count, double value)
 {
     size_t from = 0, to = count;
@@ -28,13 +28,13 @@ static size_t count_below(const float *sorted, size_t count, double value)
     return from;
 }
 
-/* Sorted values begin to end - 1, and their squared distance to their mean. */
+/* The sorted values with indices [begin, end), their mean, and the sum of squared distances to it. */
 typedef struct range {
     size_t begin, end;
     double mean, error;
 } range;
 
-/* `sums` are those of all values before one, and of their squares. */
+/* sums[i]: the sum of the first i values, and of their squares. */
 static range range_of(const double (*sums)[2], size_t begin, size_t end)
 {
     const double count = (double)(end - begin), sum = sums[end][0] - sums[begin][0];
@@ -54,7 +54,7 @@ static void cut_ranges(const float *sorted, const double (*sums)[2], size_t coun
         const size_t middle = r.begin + count_below(sorted + r.begin, r.end - r.begin, r.mean);
         if (!(r.error > 0))
             break;
-        if (middle == r.begin || middle == r.end) { /* all the same, but for rounding */
+        if (middle == r.begin || middle == r.end) { /* all values are equal; the error is rounding */
             ranges[worst].error = 0;
             continue;
         }
@@ -96,7 +96,7 @@ unsigned char palette_nearest(const float levels[PALETTE_LEVELS], float value)
 
 /* ---- vectors ---- */
 
-/* Vectors order[begin] to order[end - 1]. */
+/* The vectors order[begin] to order[end - 1]. */
 typedef struct cell {
     size_t begin, end;
     double error;
@@ -107,7 +107,7 @@ typedef struct cutting {
     const float *vectors;
     size_t width;
     uint32_t *order, *spare;
-    cell *heap; /* the largest error first */
+    cell *heap; /* a max-heap by error */
     size_t count;
 } cutting;
 
@@ -135,7 +135,8 @@ static double along(const cutting *c, const cell *from, uint32_t row, const doub
     return sum;
 }
 
-/* By the power method; it begins at the vector that is farthest from the mean. */
+/* The principal axis of a cell by power iteration, started with the difference of the farthest vector to the
+   mean. */
 static void principal_axis(const cutting *c, const cell *from, double axis[WIDTH_MAX])
 {
     double farthest = -1;
@@ -166,7 +167,8 @@ static void principal_axis(const cutting *c, const cell *from, double axis[WIDTH
     }
 }
 
-/* Vectors below the mean first, each half in its old order; where the other half begins. */
+/* Partition a cell by the side of the mean on which its vectors lie along the principal axis: those below
+   first, each half in its old order. Returns where the second half begins. */
 static size_t divide(const cutting *c, const cell *from)
 {
     double axis[WIDTH_MAX];
@@ -224,7 +226,7 @@ static void cut_cells(cutting *c, size_t count, size_t limit)
     while (c->count < limit && c->heap[0].error > 0) {
         cell low = c->heap[0], high = c->heap[0];
         low.end = high.begin = divide(c, &c->heap[0]);
-        if (low.end == low.begin || high.end == high.begin) { /* nothing that can be told apart */
+        if (low.end == low.begin || high.end == high.begin) { /* the vectors do not differ measurably */
             c->heap[0].error = 0;
             sink_down(c, 0);
             continue;

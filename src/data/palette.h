@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/palette.h -- many values told by few: 256 numbers for numbers, and vectors for vectors. */
+/* data/palette.h -- quantization with palettes: 256 levels for scalars, codebooks for vectors. */
 #ifndef GBT_DATA_PALETTE_H
 #define GBT_DATA_PALETTE_H
 
@@ -10,24 +10,24 @@
 
 enum { PALETTE_LEVELS = 256 };
 
-/** Levels with a small mean squared distance to the values, ascending: as the entries of palette_make(). At
-   least one value. */
+/** 256 levels, ascending, with a small mean squared distance to the values; chosen by splitting as in
+    palette_make(). There must be at least one value. */
 gbt_status palette_levels(const float *values, size_t count, float levels[PALETTE_LEVELS], gbt_error *err);
 
-/** The nearest level. */
+/** The index of the nearest level. */
 unsigned char palette_nearest(const float levels[PALETTE_LEVELS], float value);
 
-/** Vectors for vectors. */
+/** A codebook, and the entry of each vector. */
 typedef struct palette {
     size_t count, width;
     float *entries;   /* [count][width] */
-    uint32_t *labels; /* [vectors]: the entry of each */
+    uint32_t *labels; /* [vectors]: index of the entry for each vector */
 } palette;
 
 /**
- * At most `limit` entries: all vectors are one cell at first, then the cell with the largest squared error is
- * cut in two at its mean, across its principal axis, again and again. Entries are the means of cells; cells
- * of one branch are neighbours in the list.
+ * Make a codebook of at most `limit` entries. All vectors start in one cell; the cell with the largest
+ * squared error is split again and again, at its mean, perpendicular to its principal axis. The entries are
+ * the means of the cells, in an order that keeps the cells of a split close together.
  *
  * @param vectors [in] [count][width]
  * @param out     [out] free with palette_free()

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/photo.c -- a photo as training wants it: three channels, alpha on a colour, area-averaged to the size
-   asked for. */
+/* data/photo.c -- loads a photo as training needs it: three channels, alpha composited on a colour, and
+   resampled to the requested size by area averaging. */
 #include <math.h>
 #include <string.h>
 
@@ -11,9 +11,10 @@
 #include "data/photo_size.h"
 #include "data/scene.h"
 
-/* Four channels to three; `premultiplied`: the colours are times alpha already. image_read() gives finite
-   values, and alpha in [0, 1] keeps them so; where it is a mask, they are divided by no less than a half,
-   for what is below does not count. */
+/* Convert three or four channels to three. `premultiplied`: the colours are already multiplied by alpha.
+   image_read() gives finite values, and clamping alpha to [0, 1] keeps them finite. If alpha is a mask,
+   premultiplied colours are divided by it, but only where it is at least 1/2: below that the pixel is
+   excluded anyway. */
 static gbt_status to_rgb(const image *in, gbt_alpha kind, bool premultiplied, image *out, gbt_error *err)
 {
     const float behind = kind == GBT_ALPHA_WHITE;
@@ -31,8 +32,8 @@ static gbt_status to_rgb(const image *in, gbt_alpha kind, bool premultiplied, im
     return GBT_OK;
 }
 
-/* EXR says that colours are multiplied by alpha, PNG that they are not, and image_read() leaves both as they
-   are. */
+/* The EXR specification says that colours are premultiplied, PNG's that they are not; image_read() converts
+   neither. */
 static gbt_status is_premultiplied(const char *path, const image *stored, bool *out, gbt_error *err)
 {
     image_header header;
@@ -44,7 +45,7 @@ static gbt_status is_premultiplied(const char *path, const image *stored, bool *
     return GBT_OK;
 }
 
-/* Read a photo and look at its shape; `valid` is optional. */
+/* Read a photo, check its aspect ratio and apply its mask; `valid` is optional (NULL). */
 static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
 {
     GBT_TRY(image_read_valid(view->path, stored, valid, err));
@@ -56,7 +57,7 @@ static gbt_status read_stored(const scene_view *view, image *stored, unsigned ch
         view->camera.width, view->camera.height, stored->width, stored->height);
 }
 
-/* How transparent a stored photo is, at another size; `out` stays empty where nothing is. */
+/* The transparency of a stored photo (1 - alpha), resampled. `out` stays empty if the photo is opaque. */
 static gbt_status read_transparency(const image *stored, gbt_alpha kind, int width, int height, image *out,
                                     gbt_error *err)
 {
@@ -71,7 +72,7 @@ static gbt_status read_transparency(const image *stored, gbt_alpha kind, int wid
     return status;
 }
 
-/* `valid` and `transparency` are optional. */
+/* `valid` and `transparency` are optional (NULL). */
 static gbt_status read_photo(const scene_view *view, int width, int height, image *out, unsigned char **valid,
                              image *transparency, gbt_error *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/photo_check.c -- the headers of all photos, against their cameras. */
+/* data/photo_check.c -- compares the headers of all photos and masks with their cameras. */
 #include "data/photo_check.h"
 
 #include <stdarg.h>
@@ -11,8 +11,7 @@
 #include "base/log.h"
 #include "data/photo_size.h"
 
-/* A photo of less than a sixteenth of its camera's pixels on a side is no reduced copy that anybody trains
- * on. */
+/* A photo below 1/16 of its camera's width is probably a thumbnail, not a copy reduced for training. */
 enum { TINY_RATIO = 16 };
 
 static void add_problem(photo_check *c, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -28,7 +27,7 @@ static void add_problem(photo_check *c, const char *format, ...)
     c->problem_count++;
 }
 
-/* What training would refuse, for this reason. */
+/* Record a photo or mask that training would reject, with the reason. */
 static void refuse(photo_check *c, size_t *kind, const gbt_error *why)
 {
     (*kind)++;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/photo_size.c -- exact area averaging of images, and which sizes go together. */
+/* data/photo_size.c -- resamples images by exact area averaging, and compares aspect ratios. */
 #include "data/photo_size.h"
 
 #include <math.h>
@@ -9,10 +9,11 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
-/* The input pixels under output pixel i of `out_count`, and how much of each. Edges are integers in units of
-   1 / out_count input pixels, so that weights are exact and sum to in_count exactly. */
+/* The input pixels that output pixel i of `out_count` covers, and how much of each. Edges are integers in
+   units of 1 / out_count input pixels, so the weights are exact and sum to exactly in_count. */
 typedef struct box {
-    uint64_t begin, end; /* input pixels [begin / out_count, ...) while pixel * out_count < end */
+    uint64_t begin, end; /* in those units; the first covered pixel is begin / out_count, the last has pixel *
+                            out_count < end */
     uint64_t out_count;
 } box;
 
@@ -29,7 +30,7 @@ static double box_weight(const box *b, uint64_t pixel)
     return (double)(right - left);
 }
 
-/* One row of `in_count` pixels to `out_count`. */
+/* Resample one row from `in_count` to `out_count` pixels. */
 static void narrow_row(const float *in, size_t in_count, size_t channels, float *out, size_t out_count)
 {
     for (size_t i = 0; i < out_count; i++) {
@@ -45,7 +46,7 @@ static void narrow_row(const float *in, size_t in_count, size_t channels, float 
     }
 }
 
-/* Row i of the output from rows of `values` numbers; `sum` is scratch. */
+/* Row i of the output, as a weighted mean of input rows of `values` numbers; `sum` is scratch. */
 static void lower_row(const float *in, size_t in_count, size_t values, double *sum, float *out, size_t i,
                       size_t out_count)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/ply.c -- the rows of a PLY file, and point clouds made of them. */
+/* data/ply.c -- reads the rows of a PLY file, and point clouds from them. */
 #include "data/ply.h"
 
 #include <math.h>
@@ -39,11 +39,11 @@ static double take_binary(cursor *c, ply_type type, ply_format format)
     }
 }
 
-/* Fewest bytes that a row of this element takes. */
+/* The least number of bytes that a row of this element can take. */
 static size_t least_row_bytes(const ply_header *header, const ply_element *e)
 {
     if (header->format == PLY_ASCII)
-        return 2 * e->property_count; /* a digit and a separator each */
+        return 2 * e->property_count; /* a digit and a separator for each property */
     size_t bytes = 0;
     for (size_t i = 0; i < e->property_count; i++) {
         const ply_property *p = &header->properties[e->first_property + i];
@@ -70,7 +70,7 @@ static gbt_status check_count(const source_file *file, const cursor *c, const pl
     if (e->property_count == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: element %.*s has rows but no properties", file->name,
                          shown, e->name);
-    /* The newline of the last ASCII row may be missing, so one byte is granted there. */
+    /* The last row of an ASCII file may lack its newline, so one missing byte is allowed. */
     const size_t row_bytes = least_row_bytes(header, e), grant = header->format == PLY_ASCII ? 1 : 0;
     if (e->count > (cursor_left(c) + grant) / row_bytes)
         return base_fail(err, GBT_ERR_FORMAT,
@@ -79,7 +79,7 @@ static gbt_status check_count(const source_file *file, const cursor *c, const pl
     return GBT_OK;
 }
 
-/* The one list that is kept of each row. */
+/* The one list property whose items are kept. */
 typedef struct kept_list {
     int property; /* within the element; -1: none */
     double *items;
@@ -94,8 +94,8 @@ static gbt_status keep_item(kept_list *list, double value, gbt_error *err)
     return GBT_OK;
 }
 
-/* One binary row; `values` gets every scalar property of the element, `list` one of the lists; the others are
-   skipped. */
+/* Read one binary row. `values` gets every scalar property of the element, `list` the items of one list;
+   other lists are skipped. */
 static gbt_status take_binary_row(cursor *c, const ply_header *header, const ply_element *e, double *values,
                                   kept_list *list, gbt_error *err)
 {
@@ -135,7 +135,7 @@ static gbt_status take_ascii_value(const char **at, const char *end, raw_place p
                     length < 60 ? (int)length : 60, token);
 }
 
-/* One ASCII row on a line of its own; blank lines before it are skipped. */
+/* Read one ASCII row, which is one line; blank lines before it are skipped. */
 static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *header, const ply_element *e,
                                  double *values, kept_list *list, gbt_error *err)
 {
@@ -176,7 +176,7 @@ static gbt_status take_ascii_row(cursor *c, size_t *line, const ply_header *head
     return GBT_OK;
 }
 
-/* What becomes of each row of the wanted element. */
+/* Called for each row of the requested element. */
 typedef gbt_status use_row(void *context, const double *values, const kept_list *list, gbt_error *err);
 
 static gbt_status read_rows(const source_file *file, const ply_header *header, int element, kept_list *list,
@@ -186,7 +186,8 @@ static gbt_status read_rows(const source_file *file, const ply_header *header, i
     size_t line = header->line_count;
     double values[PLY_MAX_PROPERTIES];
     kept_list none = {.property = -1};
-    /* What follows the wanted element is read too: a file that ends inside of it is damaged. */
+    /* Elements after the requested one are read too, so that a file which ends inside them is found to be
+       damaged. */
     for (int i = 0; i < (int)header->element_count; i++) {
         const ply_element *e = &header->elements[i];
         GBT_TRY(check_count(file, &c, header, e, err));
@@ -306,8 +307,8 @@ gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *e
     cursor c = {.file = file, .at = header.data_at};
     if (vertex == 0)
         GBT_TRY(check_count(file, &c, &header, e, err));
-    /* Behind other elements the exact place is not known yet; the whole rest still bounds the count: x, y and
-       z take a byte each. */
+    /* Where other elements come first, the exact position of the vertices is not known yet. All remaining
+       bytes are still an upper bound: x, y and z take at least one byte each. */
     if (e->count > cursor_left(&c) / 3)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %llu vertices cannot be in %zu bytes", file->name,
                          (unsigned long long)e->count, file->size);

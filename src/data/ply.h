@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/ply.h -- PLY files: any element as rows of doubles, point clouds, and a writer for clouds and
+/* data/ply.h -- PLY files: reads any element as rows of doubles and point clouds; writes point clouds and
    meshes. */
 #ifndef GBT_DATA_PLY_H
 #define GBT_DATA_PLY_H
@@ -26,7 +26,7 @@ typedef struct ply_property {
     size_t name_length;
     ply_type type;
     bool is_list;
-    ply_type count_type; /* of a list */
+    ply_type count_type; /* type of the item count, if this is a list */
 } ply_property;
 
 typedef struct ply_element {
@@ -43,7 +43,7 @@ typedef struct ply_header {
     size_t element_count, property_count;
     ply_element elements[PLY_MAX_ELEMENTS];
     ply_property properties[PLY_MAX_PROPERTIES]; /* of all elements, in file order */
-    size_t data_at;                              /* offset of the first byte behind the header */
+    size_t data_at;                              /* offset of the first byte after the header */
     size_t line_count;                           /* lines of the header, for messages about ASCII rows */
 } ply_header;
 
@@ -54,10 +54,10 @@ gbt_status ply_read_header(const source_file *file, ply_header *out, gbt_error *
 int ply_find_element(const ply_header *header, const char *name);
 int ply_find_property(const ply_header *header, int element, const char *name);
 
-/** Bytes of a row of an element whose rows all have the same number; 0: ASCII, or rows with lists. */
+/** Bytes of a row, if all rows of the element have the same size; 0 for ASCII and for rows with lists. */
 size_t ply_row_bytes(const ply_header *header, int element);
 
-/** One row: the wanted columns in the order asked for, integers as they are. */
+/** Receives one row: the requested columns in the requested order; integers are not scaled. */
 typedef void ply_row(void *context, const double *values);
 
 enum { PLY_MAX_COLUMNS = 128 };
@@ -73,19 +73,20 @@ enum { PLY_MAX_COLUMNS = 128 };
 gbt_status ply_read_rows(const source_file *file, const ply_header *header, int element, const int *columns,
                          size_t column_count, ply_row *row, void *context, gbt_error *err);
 
-/** One list of a row, integers as they are; `items` is borrowed for the call. A failure ends the reading. */
+/** Receives one list of a row; integers are not scaled. `items` is borrowed for the call. A failure ends the
+    reading. */
 typedef gbt_status ply_list(void *context, const double *items, size_t count, gbt_error *err);
 
-/** Call `take` with the list `property` (index within the element) of each row; else as ply_read_rows(). Also
-    GBT_ERR_NO_MEMORY. */
+/** Call `take` with the list `property` (an index within the element) of each row; otherwise as
+    ply_read_rows(). May also return GBT_ERR_NO_MEMORY. */
 gbt_status ply_read_lists(const source_file *file, const ply_header *header, int element, int property,
                           ply_list *take, void *context, gbt_error *err);
 
-/** x y z of element "vertex", with red green blue when there; the rest is skipped. `out` zeroed by the
-    caller; free with raw_free(). */
+/** Read x y z of element "vertex", and red green blue if present; everything else is skipped. The caller
+    zeroes `out` and frees it with raw_free(). */
 gbt_status ply_read_points(const source_file *file, raw_scene *out, gbt_error *err);
 
-/** A per-vertex float property to be written: values[i * stride]. Borrowed. */
+/** An additional float property of each vertex to write: values[i * stride]. Borrowed. */
 typedef struct ply_extra {
     const char *name; /* letters, digits and underscores */
     const float *values;
@@ -95,7 +96,8 @@ typedef struct ply_extra {
 /** What ply_write() writes; everything is borrowed for the call. Start from `= {0}`. */
 typedef struct ply_cloud {
     size_t vertex_count;
-    const float *position; /* [vertex_count][3], written as x y z: doubles, or floats if the origin is 0 */
+    const float *position; /* [vertex_count][3], written as x y z: as doubles, or as floats if the origin is 0
+                            */
     double origin[3];      /* added to every position before it is written (see scene.origin) */
     size_t extra_count;
     const ply_extra *extras; /* written between z and red, in this order */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/ply_write.c -- point clouds and triangle meshes as binary little-endian PLY. */
+/* data/ply_write.c -- writes point clouds and triangle meshes as binary little-endian PLY. */
 #include <stdio.h>
 
 #include "base/file.h"
@@ -29,7 +29,7 @@ static gbt_status check_cloud(const char *path, const ply_cloud *cloud, gbt_erro
     return GBT_OK;
 }
 
-/* Far from 0 a float is too coarse: of 5 million it leaves halves. */
+/* With an origin, coordinates may be large, where floats are too coarse: their step at 5 million is 1/2. */
 static bool is_double(const ply_cloud *cloud)
 {
     return cloud->origin[0] != 0 || cloud->origin[1] != 0 || cloud->origin[2] != 0;

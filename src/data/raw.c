@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/raw.c -- the container that readers fill, and the checks that every source shares. */
+/* data/raw.c -- fills and checks the views and points that readers produce. */
 #include "data/raw.h"
 
 #include <math.h>
@@ -115,9 +115,9 @@ gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3
     return GBT_OK;
 }
 
-/* One in so many points may be nearer than the depth that counts as the nearest: they may be wrong. Lenses
-   that look to all sides see some five times as much of the scene, and a thing beside them has fewer of the
-   points. */
+/* One of this many points may be nearer than what counts as the nearest depth, because some points are wrong.
+   Lenses that look in all directions see about five times as much of the scene, so an object next to the
+   camera has a smaller share of the points. */
 enum { NEARER_POINTS = 100, NEARER_POINTS_ALL_AROUND = 500 };
 
 gbt_status raw_nearest_depth(const raw_scene *raw, const raw_view *view, double *depth, gbt_error *err)

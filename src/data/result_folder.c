@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/result_folder.c -- find the newest iteration, read the settings that matter. */
+/* data/result_folder.c -- finds the newest iteration in a 3DGS result folder, and reads the settings that
+   matter. */
 #include "data/result_folder.h"
 
 #include <stdio.h>
@@ -10,9 +11,9 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-enum { REDUCED_MAX = 8 /* N of images_N; a larger number is no divisor */ };
+enum { REDUCED_MAX = 8 /* of N in images_N; a larger number is no reduction factor */ };
 
-/* The text behind "key='", up to the next quote, of Python's Namespace(...). */
+/* The text between "key='" and the next quote; cfg_args is a Python Namespace(...) printed as text. */
 static void find_text(const char *text, const char *key, char *out, size_t size)
 {
     const char *at = strstr(text, key), *end = at == NULL ? NULL : strchr(at + strlen(key), '\'');
@@ -34,8 +35,8 @@ static void find_resolution(const char *text, result_folder *out)
     out->width = out->downscale == 0 && value > 0 && value <= 1 << 20 ? (int)value : 0;
 }
 
-/* images='images_N': photos that were divided by N before, and then by what `resolution` says; a width stays
-   as it is. */
+/* images='images_N': the photos were first reduced by N, then by the `resolution` factor. If `resolution` is
+   a width, it alone decides. */
 static void find_reduced_photos(const char *text, result_folder *out)
 {
     static const char reduced[] = "images_";
@@ -81,6 +82,6 @@ gbt_status result_folder_find(const char *folder, result_folder *out, bool *foun
     GBT_TRY(file_join(out->ply, sizeof out->ply, clouds, name, err));
     GBT_TRY(file_join(clouds, sizeof clouds, folder, "model.gbt", err));
     *found = file_exists(out->ply) &&
-             !file_exists(clouds); /* a run of ours may have such a folder beside its model */
+             !file_exists(clouds); /* a gbtrace run may contain a point_cloud folder, too */
     return *found ? read_settings(folder, out, err) : GBT_OK;
 }

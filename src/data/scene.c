@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/scene.c -- from a path to a scene: find the files, read them, recentre, split.
+/* data/scene.c -- loads a scene from a path: finds the files, reads them, recentres and splits.
 
    path --> [which source?] --> reader --> raw_scene (double, world) --> [photos there?] --> [origin]
         --> scene (local) --> [split] */
@@ -37,7 +37,7 @@ static gbt_status load_file(const char *path, raw_scene *raw, source_file *out, 
     return status;
 }
 
-/* COLMAP 4 has poses of rigs beside those of images, which are composed of them already. */
+/* COLMAP 4 also writes the poses of rigs. They are not needed: image poses already include them. */
 static void say_rigs(const char *model, const char *ending)
 {
     char name[32], path[PATH_SIZE];
@@ -78,7 +78,7 @@ static gbt_status read_model(const char *model, const char *ending, raw_scene *r
     return status;
 }
 
-/* The model that is in `folder`, if there is one. */
+/* Load the COLMAP model in `folder`, if there is one. */
 static gbt_status load_colmap(const char *folder, colmap_layout layout, raw_scene *raw, const char **source,
                               bool *found, gbt_error *err)
 {
@@ -103,7 +103,7 @@ static gbt_status load_points(const char *path, raw_scene *raw, gbt_error *err)
     return status;
 }
 
-/* Adds views; points, where there are none yet. */
+/* Add the views of a transforms.json, and its points unless there are some already. */
 static gbt_status add_transforms(const char *path, const char *folder, bool may_be_empty, raw_scene *raw,
                                  gbt_error *err)
 {
@@ -136,7 +136,7 @@ static gbt_status load_transforms(const char *path, const char *folder, raw_scen
     return raw_sort_views(raw, path, err);
 }
 
-/* Photos, and of one photo the view to train on first. */
+/* By photo; for the same photo, training views come first. */
 static int by_photo(const void *a, const void *b)
 {
     const raw_view *x = a, *y = b;
@@ -144,7 +144,7 @@ static int by_photo(const void *a, const void *b)
     return order != 0 ? order : x->is_test - y->is_test;
 }
 
-/* A photo that is trained on cannot be held out, too. */
+/* Drop held-out views whose photo is also trained on. */
 static void drop_repeated(raw_scene *raw, size_t *dropped)
 {
     size_t kept = 0;
@@ -161,7 +161,8 @@ static void drop_repeated(raw_scene *raw, size_t *dropped)
     raw->view_count = kept;
 }
 
-/* Blender's synthetic scenes: the views to train on in `train`, held-out ones in a file beside it. */
+/* Blender's synthetic scenes: `train` is transforms_train.json; the held-out views are in a file beside it.
+ */
 static gbt_status load_blender(const char *train, const char *folder, raw_scene *raw, gbt_error *err)
 {
     static const char *const held_out[] = {"transforms_test.json", "transforms_val.json"};
@@ -254,8 +255,7 @@ static uint64_t ordered_bits(double value)
     return bits >> 63 ? ~bits : bits | UINT64_C(1) << 63;
 }
 
-/* The lower median of values[0], values[stride], ...: radix selection, 8 passes whatever the data, no
-   copy. */
+/* The lower median of values[0], values[stride], ... by radix selection: always 8 passes, and no copy. */
 static double median(const double *values, size_t stride, size_t count)
 {
     size_t rank = (count - 1) / 2;
@@ -278,7 +278,7 @@ static double median(const double *values, size_t stride, size_t count)
     return value;
 }
 
-/* Of the camera centres; `first` is that of the first of `count` views, each of so many bytes. */
+/* The median of the camera centres. `first` is the camera of the first view; views are `view_bytes` apart. */
 static gbt_status median_center(const gbt_camera *first, size_t view_bytes, size_t count, double out[3],
                                 gbt_error *err)
 {
@@ -303,7 +303,7 @@ static gbt_status find_origin(const raw_scene *raw, double origin[3], gbt_error 
     return median_center(&raw->views[0].camera, sizeof *raw->views, raw->view_count, origin, err);
 }
 
-/* Every n-th sighting, so that no more than SCENE_SEEN_MAX remain, and the depth of the nearest. */
+/* Keep every n-th sighting, so that at most SCENE_SEEN_MAX remain, and the depth of the nearest points. */
 static gbt_status keep_sightings(const raw_scene *raw, const raw_view *view, scene_view *out, gbt_error *err)
 {
     const size_t stride = view->seen_count / SCENE_SEEN_MAX + 1;
@@ -316,7 +316,7 @@ static gbt_status keep_sightings(const raw_scene *raw, const raw_view *view, sce
     return GBT_OK;
 }
 
-/* Move everything from `raw` to `out`, relative to out->origin. */
+/* Move everything from `raw` to `out`, with coordinates relative to out->origin. */
 static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
 {
     out->points.position = mem_alloc(raw->point_count, 3 * sizeof *out->points.position, "points", err);
@@ -333,8 +333,8 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     out->points.color = raw->color;
     raw->color = NULL;
     if (out->points.color == NULL)
-        out->points.color = mem_alloc(0, sizeof(float), "point colours", err); /* a scene always has its
-                                                                                  arrays, empty or not */
+        out->points.color =
+            mem_alloc(0, sizeof(float), "point colours", err); /* never NULL, even without points */
     if (out->points.color == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++) {
@@ -470,6 +470,6 @@ double scene_camera_extent(const scene *s)
             const double from_mean[3] = {c[0] - mean[0], c[1] - mean[1], c[2] - mean[2]};
             farthest = fmax(farthest, dvec_length(from_mean));
         }
-    return fmax(1.1 * farthest, 1e-3); /* one camera, or all at one place, must not freeze the learning rate
-                                          at 0 */
+    return fmax(1.1 * farthest, 1e-3); /* not 0 for a single camera or position, or else the learning rate
+                                          would be 0 */
 }

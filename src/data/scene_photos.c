@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/scene_photos.c -- photos and masks by their names, and what their transparent parts are. */
+/* data/scene_photos.c -- finds photos and masks by name, and determines how transparent parts are handled. */
 #include "data/scene_photos.h"
 
 #include <stdio.h>
@@ -14,7 +14,7 @@
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };
 
-/* A copy of folder/name in `out` when that is a file; else `out` stays. */
+/* Set `out` to a copy of the path folder/name if that is a file; otherwise `out` is unchanged. */
 static gbt_status take_file(const char *folder, const char *name, char **out, gbt_error *err)
 {
     char path[PATH_SIZE];
@@ -65,7 +65,8 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
         status = find_files(folder, images, raw->has_masks ? masks : NULL, &view, err);
         if (status == GBT_OK && view.path == NULL)
             status = raw_count_missing(raw, view.name, err);
-        raw->views[i] = raw->views[kept]; /* what is left out goes behind, where raw_free() finds it */
+        raw->views[i] = raw->views[kept]; /* views without a photo move to the end, where raw_free() still
+                                             finds them after a failure */
         raw->views[kept] = view;
         kept += view.path != NULL;
     }
@@ -79,9 +80,10 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- what is transparent ---- */
+/* ---- transparency ---- */
 
-/* Photos that are cut out are so one and all, and reading hundreds that are opaque would take long. */
+/* Data sets with cut-out photos normally have only such photos, so a few are enough to tell; reading hundreds
+   of opaque ones would take long. */
 enum { LOOKED_AT_MAX = 4 };
 
 void scene_set_alpha(scene *s, gbt_alpha alpha)

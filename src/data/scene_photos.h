@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/scene_photos.h -- where the photos and masks of a COLMAP model are. */
+/* data/scene_photos.h -- finds the photos and masks of a COLMAP model. */
 #ifndef GBT_DATA_SCENE_PHOTOS_H
 #define GBT_DATA_SCENE_PHOTOS_H
 
 #include "data/raw.h"
 
 /**
- * The photo of each view: `folder`/images/NAME, else `folder`/NAME. Views without one are taken out of `raw`
- * and counted.
+ * Find the photo of each view: `folder`/images/NAME, else `folder`/NAME. Views without one are removed from
+ * `raw` and counted.
  *
- * When there is a folder `folder`/masks, the mask of a view is masks/NAME.png, else masks/NAME, else
- * masks/NAME with the ending .png.
+ * If there is a folder `folder`/masks, the mask of a view is masks/NAME.png, else masks/NAME, else masks/NAME
+ * with its ending replaced by .png.
  * @return GBT_OK; GBT_ERR_IO when no view has a photo; GBT_ERR_ARGUMENT (a path is too long),
  *         GBT_ERR_NO_MEMORY
  */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/sog.h -- .sog bundles, version 2: a .zip of meta.json and of lossless .webp tables with a pixel for
-   each Gaussian. */
+/* data/sog.h -- .sog bundles, version 2, as PlayCanvas defines them: a .zip with meta.json and lossless .webp
+   tables, one pixel per Gaussian. */
 #ifndef GBT_DATA_SOG_H
 #define GBT_DATA_SOG_H
 
@@ -9,10 +9,10 @@
 
 enum {
     SOG_PALETTE_MAX = 65536, /* labels have 16 bits */
-    SOG_ENTRIES_PER_ROW = 64 /* of the table of harmonics */
+    SOG_ENTRIES_PER_ROW = 64 /* in the table of SH coefficients */
 };
 
-/** The near distance, a number in `asset` of meta.json. */
+/** The near distance: our own number in `asset` of meta.json. */
 #define SOG_NEAR "gbtrace_near"
 
 /** As gaussian_format.read. */

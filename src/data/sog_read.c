@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/sog_read.c -- a bundle's tables to Gaussians. */
+/* data/sog_read.c -- reads .sog bundles: meta.json and tables to Gaussians. */
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,23 +11,23 @@
 
 enum {
     TABLES = 7,
-    RATIO_MAX = 16 /* Gaussians to a byte of the file: beyond, it is no scene */
+    RATIO_MAX = 16 /* most Gaussians per byte of the file that are plausible */
 };
 
 typedef enum table_id { MEANS_LOW, MEANS_HIGH, SCALES, ROTATIONS, COLORS, CENTROIDS, LABELS } table_id;
 
 static const struct {
-    const char *key; /* of meta.json */
-    size_t file;     /* of its list of files */
+    const char *key; /* in meta.json */
+    size_t file;     /* index in that entry's list of files */
 } table_keys[TABLES] = {{"means", 0}, {"means", 1}, {"scales", 0}, {"quats", 0},
                         {"sh0", 0},   {"shN", 0},   {"shN", 1}};
 
 typedef struct bundle {
     const source_file *file;
     json_t *meta;
-    size_t count, entries; /* Gaussians; of the palette, 0: none */
+    size_t count, entries; /* Gaussians; palette entries, 0: none */
     int degree;
-    double low[3], high[3]; /* of positions, as logs */
+    double low[3], high[3]; /* range of the positions, log encoded */
     float scales[PALETTE_LEVELS], colors[PALETTE_LEVELS], harmonics[PALETTE_LEVELS];
     webp_table tables[TABLES];
 } bundle;
@@ -108,7 +108,7 @@ static gbt_status read_table(bundle *b, table_id id, gbt_error *err)
     GBT_TRY(archive_take(b->file, name, &bytes, &inside.size, err));
     inside.bytes = bytes;
     webp_table *t = &b->tables[id];
-    /* Tables are near squares; the last row need not be full. */
+    /* Tables are near squares, and the last row need not be full. */
     gbt_status status = webp_read(&inside, 2 * wanted + 65536, t, err);
     mem_free(bytes);
     GBT_TRY(status);
@@ -158,7 +158,7 @@ static void unpack(const bundle *b, size_t i, gaussian_row *row)
     const unsigned char *label = b->tables[LABELS].bytes + 4 * i;
     const size_t entry = (size_t)label[0] | (size_t)label[1] << 8;
     if (entry >= b->entries)
-        row->opacity = NAN; /* not usable: counted and left out */
+        row->opacity = NAN; /* not usable: gaussian_cloud_add() counts and drops it */
     for (size_t k = 0; k < functions && entry < b->entries; k++)
         for (size_t c = 0; c < 3; c++)
             row->sh[1 + k][c] =
@@ -171,7 +171,7 @@ static gbt_status read_all(bundle *b, gaussian_cloud *out, gbt_error *err)
     for (int id = 0; id < (b->entries > 0 ? TABLES : (int)CENTROIDS); id++)
         GBT_TRY(read_table(b, (table_id)id, err));
     GBT_TRY(gaussian_cloud_alloc(out, b->count, err));
-    out->count = 0; /* of those that are usable */
+    out->count = 0; /* counts the usable rows from here on */
     out->sh_degree = b->degree;
     const char *model = json_string_value(json_object_get(b->meta, "model"));
     out->antialiased = json_is_true(json_object_get(b->meta, "antialias")) ||

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/sog_write.c -- Gaussians to tables of bytes: positions as logs in 16 bits, scales and colours by 256
-   levels, harmonics above the first by a palette. */
+/* data/sog_write.c -- writes .sog bundles: positions log encoded in 16 bits, scales and colours by 256
+   levels, SH coefficients above degree 0 by a palette. */
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,13 +13,13 @@
 #include "data/sog.h"
 #include "data/webp.h"
 
-enum { FILES_MAX = 8, GAUSSIANS_PER_ENTRY = 4 /* of the palette, where it may be larger */ };
+enum { FILES_MAX = 8, GAUSSIANS_PER_ENTRY = 4 /* in the palette, unless limited to 1 for each */ };
 
 typedef struct writing {
     const gaussian_cloud *cloud;
     const double *origin;
     uint32_t *order;
-    webp_table table; /* one at a time */
+    webp_table table; /* the one being filled */
     json_t *meta;
     sink files[FILES_MAX];
     const char *names[FILES_MAX];
@@ -40,7 +40,7 @@ static gbt_status open_table(webp_table *t, size_t width, size_t height, gbt_err
     return GBT_OK;
 }
 
-/* A pixel for each Gaussian, near a square. */
+/* Start a table with a pixel for each Gaussian, close to a square. */
 static gbt_status open_pixels(writing *w)
 {
     const size_t n = w->cloud->count, width = (size_t)ceil(sqrt((double)n) / 4) * 4;
@@ -105,7 +105,8 @@ static gbt_status put_positions(writing *w)
 
 /* ---- rotations ---- */
 
-/* The largest of w x y z is left out, and positive. */
+/* Smallest-three encoding: the component of w x y z with the largest magnitude is made positive and dropped.
+ */
 static gbt_status put_rotations(writing *w)
 {
     GBT_TRY(open_pixels(w));
@@ -127,7 +128,7 @@ static gbt_status put_rotations(writing *w)
 
 /* ---- scales and colours ---- */
 
-/* Three numbers of each Gaussian by 256 levels of all of them. */
+/* Quantize three numbers per Gaussian with 256 levels common to all of them. */
 static gbt_status put_levels(writing *w, const float *values, size_t stride, bool with_opacity,
                              const char *key, const char *file)
 {
@@ -155,7 +156,7 @@ static gbt_status put_levels(writing *w, const float *values, size_t stride, boo
     return close_table(w, file);
 }
 
-/* ---- harmonics above the first ---- */
+/* ---- SH coefficients above degree 0 ---- */
 
 static gbt_status put_palette(writing *w, const palette *p, size_t functions)
 {
@@ -243,7 +244,7 @@ static gbt_status write_bundle(const writing *w, const char *path)
 }
 
 /*
- * Write one. The bytes depend on the version of libwebp, what they say does not.
+ * Write a .sog. The bytes depend on the version of libwebp, the values do not.
  *
  * @param origin [in] added to every mean in double
  */

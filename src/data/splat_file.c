@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/splat_file.c -- rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion w x y z as 128 + 128 q
-   }. */
+/* data/splat_file.c -- reads and writes .splat: rows of { f32 x y z; f32 scale[3]; u8 r g b a; u8 quaternion
+   w x y z as 128 + 128 q }. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -15,7 +15,7 @@ static void read_row(cursor *c, gaussian_cloud *out)
     for (size_t k = 0; k < 3; k++)
         row.mean[k] = (double)cursor_f32(c);
     for (size_t k = 0; k < 3; k++)
-        row.scale_log[k] = log((double)cursor_f32(c)); /* of 0: flat; of what is less, NaN */
+        row.scale_log[k] = log((double)cursor_f32(c)); /* 0: flat; below 0: NaN, which drops the row */
     for (size_t k = 0; k < 3; k++)
         row.sh[0][k] = ((double)cursor_uint(c, 1) / 255 - 0.5) / GAUSSIAN_SH_0;
     row.opacity = (double)cursor_uint(c, 1) / 255;
@@ -25,7 +25,7 @@ static void read_row(cursor *c, gaussian_cloud *out)
 }
 
 /*
- * Read one, by the rules of gaussian_cloud_add().
+ * Read a .splat with the rules of gaussian_cloud_add().
  *
  * @param out [out] sh_degree 0; free with gaussian_cloud_free(); zeroed on failure
  * @return GBT_OK; GBT_ERR_FORMAT (not a multiple of 32 bytes, no usable Gaussian); GBT_ERR_NO_MEMORY
@@ -76,8 +76,8 @@ static void put_row(sink *s, const gaussian_cloud *cloud, size_t i, const double
 }
 
 /*
- * Write one, most opaque volume first: viewers show what has been loaded. Only the first spherical harmonic
- * is kept. `origin` as in gaussian_ply.h.
+ * Write a .splat, Gaussians with the most opacity times volume first, because viewers draw what has arrived
+ * so far. Only degree 0 of the spherical harmonics is kept. `origin` is added to every mean in double.
  */
 static gbt_status write_splat(const char *path, const gaussian_cloud *cloud, const double origin[3],
                               gbt_error *err)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/split.c -- which views are held out. */
+/* data/split.c -- decides which views are held out. */
 #include "data/split.h"
 
 #include <limits.h>
@@ -12,7 +12,7 @@
 #include "base/memory.h"
 #include "data/number.h"
 
-/* "N" or "N:K" of `length`, N >= 2, K < N. */
+/* Parse "N" or "N:K" of `length` bytes; N >= 2, K < N. */
 static bool parse_fold(const char *text, size_t length, int *every, int *offset)
 {
     const char *colon = memchr(text, ':', length);
@@ -27,7 +27,7 @@ static bool parse_fold(const char *text, size_t length, int *every, int *offset)
     return true;
 }
 
-/* The split itself, without validation. */
+/* Parse the part of a split other than validation. */
 static bool parse_kind(const char *text, scene_split *out)
 {
     if (strcmp(text, "auto") == 0)
@@ -69,7 +69,7 @@ static int name_against_view(const void *name, const void *view)
     return strcmp(name, ((const scene_view *)view)->name);
 }
 
-/* Of a view that was left out because its photo is missing. */
+/* Whether `name` is a view that was left out because its photo is missing. */
 static bool is_missing(const scene *s, const char *name)
 {
     const size_t length = strlen(name);
@@ -82,7 +82,7 @@ static bool is_missing(const scene *s, const char *name)
     return false;
 }
 
-/* `bytes` are changed: every line becomes a string of its own. */
+/* Mark the views named in the list. `bytes` is modified: every line becomes a string of its own. */
 static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *path, gbt_error *err)
 {
     size_t line = 0, missing = 0;
@@ -93,7 +93,7 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
         line++;
         while (end > at && (end[-1] == '\r' || end[-1] == ' ' || end[-1] == '\t'))
             end--;
-        *end = '\0'; /* file_read() leaves a spare byte behind the last line */
+        *end = '\0'; /* file_read() allocates one spare byte after the last line */
         if (*at != '\0') {
             scene_view *view = s->view_count > 0
                                    ? bsearch(at, s->views, s->view_count, sizeof *s->views, name_against_view)
@@ -126,15 +126,15 @@ static gbt_status apply_list(const char *path, scene *s, gbt_error *err)
     return status;
 }
 
-/* A single photo is trained on: holding it out would leave nothing. */
+/* A single photo is never held out, because nothing would be left to train on. */
 static void mark_every(scene *s, int every, int offset)
 {
     for (size_t i = 0; i < s->view_count && s->view_count > 1; i++)
         s->views[i].is_test = s->views[i].rank % (size_t)every == (size_t)offset;
 }
 
-/* Held-out views go, and of the others some are held out: what is chosen by their scores has seen nothing of
-   the views that went. */
+/* Remove the held-out views, and hold out some of the others instead: settings chosen by these scores are
+   then independent of the removed views. */
 static void validate(const scene_split *split, scene *s)
 {
     size_t kept = 0;

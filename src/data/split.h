@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/split.h -- which views are held out. */
+/* data/split.h -- decides which views are held out. */
 #ifndef GBT_DATA_SPLIT_H
 #define GBT_DATA_SPLIT_H
 
@@ -8,9 +8,9 @@
 enum { SCENE_SPLIT_DEFAULT_EVERY = 8 };
 
 /**
- * Set is_test of the views, which are sorted by name and marked where the data set has a split of its own;
- * with validate_every, remove those that it holds out. A split that leaves no view to train on is an error,
- * and validation that holds out none.
+ * Set is_test of all views. They must be sorted by name, and marked if the data set has its own split. With
+ * validate_every, the held-out views are removed. It is an error if no view is left to train on, or if
+ * validation holds out none.
  */
 gbt_status split_apply(const scene_split *split, scene *s, gbt_error *err);
 

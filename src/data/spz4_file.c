@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/spz4_file.c -- .spz version 4: header { "NGSP", 4, count, degree, fractional bits, flags, streams,
-   offset of the table, 12 zeros }, a table of { packed bytes, bytes } for each stream, then the streams, a
-   frame of zstd each. */
+/* data/spz4_file.c -- reads and writes .spz version 4.
+
+   Layout: header { "NGSP", 4, count, degree, fractional bits, flags, streams, offset of the table, 12 zeros
+   }, a table of { compressed bytes, bytes } for each stream, then the streams, one zstd frame each. */
 #include <zstd.h>
 
 #include "base/file.h"
@@ -12,13 +13,13 @@ enum {
     HEADER_BYTES = 32,
     TABLE_ROW = 16,
     LEVEL = 12,
-    PACKED_LIMIT = 1 << 16, /* of a frame: zstd makes nothing smaller */
-    RATIO_MAX = 1024        /* of all of them: places and colours are never that regular */
+    PACKED_LIMIT = 1 << 16, /* largest compression ratio of one zstd frame */
+    RATIO_MAX = 1024        /* of all streams together: positions and colours never compress that well */
 };
 
 /* ---- writing ---- */
 
-/* A stream, zipped, behind what `out` holds. */
+/* Compress a stream with zstd and append it to `out`. */
 static gbt_status put_zipped(sink *out, const sink *plain, size_t *packed, gbt_error *err)
 {
     const size_t room = ZSTD_compressBound(plain->size);
@@ -43,7 +44,7 @@ static void put_header(sink *s, const spz_header *header, int streams)
     sink_put_uint(s, (uint64_t)header->fraction, 1);
     sink_put_uint(s, header->flags, 1);
     sink_put_uint(s, (uint64_t)streams, 1);
-    sink_put_uint(s, HEADER_BYTES, 4); /* no extensions: the table follows */
+    sink_put_uint(s, HEADER_BYTES, 4); /* no extensions, so the table follows the header */
     sink_put_uint(s, 0, 8);
     sink_put_uint(s, 0, 4);
 }
@@ -89,7 +90,7 @@ typedef struct frames {
     size_t data_at;
 } frames;
 
-/* The table says what the header does: a frame for each stream that has bytes, inside the file. */
+/* The table must agree with the header: a frame for each stream that is not empty, all inside the file. */
 static gbt_status read_table(cursor *c, frames *f, gbt_error *err)
 {
     size_t row[SPZ_STREAMS];
@@ -136,7 +137,7 @@ static gbt_status read_header(const source_file *file, frames *f, gbt_error *err
     if (f->count != wanted || table_at < HEADER_BYTES || table_at > file->size)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %d streams, their table at %u (wanted %d, %d to %zu)",
                          file->name, f->count, table_at, wanted, (int)HEADER_BYTES, file->size);
-    c.at = table_at; /* extensions before it are not for us */
+    c.at = table_at; /* skips extensions before the table */
     GBT_TRY(cursor_need(&c, (size_t)f->count * TABLE_ROW, "the table of streams", err));
     return read_table(&c, f, err);
 }

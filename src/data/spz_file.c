@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/spz_file.c -- header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of
-   positions, opacities, colours, scales, rotations and spherical harmonics; all of it gzipped. */
+/* data/spz_file.c -- reads .spz versions 2 and 3, and writes version 3.
+
+   Layout: header { "NGSP", version, count, degree, fractional bits, flags, 0 }, then streams of positions,
+   opacities, colours, scales, rotations and spherical harmonics; all of it gzipped. */
 #include <zlib.h>
 
 #include "base/file.h"
@@ -16,7 +18,7 @@ static gbt_status zip_and_write(const char *path, const sink *plain, gbt_error *
     z_stream z = {.next_in = plain->bytes, .avail_in = (uInt)plain->size};
     if (plain->size > UINT32_MAX / 2)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: too many Gaussians for a .spz file", path);
-    if (deflateInit2(&z, 9, Z_DEFLATED, 15 + 16 /* a gzip header */, 8, Z_DEFAULT_STRATEGY) != Z_OK)
+    if (deflateInit2(&z, 9, Z_DEFLATED, 15 + 16 /* gzip, not zlib */, 8, Z_DEFAULT_STRATEGY) != Z_OK)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
     const uLong room = deflateBound(&z, (uLong)plain->size);
     unsigned char *zipped = mem_alloc(room, 1, "zipped splats", err);
@@ -34,8 +36,8 @@ static gbt_status zip_and_write(const char *path, const sink *plain, gbt_error *
 }
 
 /*
- * Write version 3, which nearly every reader has, in the cloud's own axes. Scales are steps of 6 % between
- * e^-10 and e^5.9, spherical harmonics 5 bits in degree 1 and 4 above.
+ * Write version 3, which nearly every reader supports. The cloud's axes are kept. Scales are quantized in
+ * steps of 6 % between e^-10 and e^5.9, SH coefficients to 5 bits in degree 1 and 4 bits above.
  *
  * @param origin [in] added to every mean in double
  * @return GBT_OK; GBT_ERR_ARGUMENT (a coordinate beyond 8 million); as file_write_atomic()
@@ -51,7 +53,7 @@ static gbt_status write_spz(const char *path, const gaussian_cloud *cloud, const
     sink_put_uint(&s, header.count, 4);
     sink_put_uint(&s, (uint64_t)header.degree, 1);
     sink_put_uint(&s, (uint64_t)header.fraction, 1);
-    sink_put_uint(&s, header.flags, 2); /* and a byte of 0 */
+    sink_put_uint(&s, header.flags, 2); /* and the reserved byte, 0 */
     for (int i = 0; i < SPZ_STREAMS; i++)
         spz_put_stream(&s, cloud, origin, &header, i);
     gbt_status status = s.status;
@@ -63,7 +65,7 @@ static gbt_status write_spz(const char *path, const gaussian_cloud *cloud, const
 
 /* ---- reading ---- */
 
-/* Inflate exactly `size` bytes more into `out`. */
+/* Decompress exactly `size` more bytes into `out`. */
 static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_t size, gbt_error *err)
 {
     while (size > 0) {
@@ -83,7 +85,8 @@ static gbt_status unzip(z_stream *z, const char *name, unsigned char *out, size_
     return GBT_OK;
 }
 
-/* The stream ends, after at most `more` bytes that are not for us: its checksum and its length are right. */
+/* Read to the end of the stream, which also checks its CRC and length. At most `more` bytes that we do not
+   use (extensions) may remain. */
 static gbt_status unzip_end(z_stream *z, const char *name, size_t more, gbt_error *err)
 {
     unsigned char block[4096];
@@ -122,7 +125,7 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     for (int i = 0; i < SPZ_STREAMS; i++)
         row += parts[i];
     const size_t count = header.count;
-    if ((double)count * (double)row > 1032.0 * (double)file->size) /* gzip makes nothing smaller than that */
+    if ((double)count * (double)row > 1032.0 * (double)file->size) /* the largest ratio of deflate */
         return base_fail(err, GBT_ERR_FORMAT, "%s: %zu Gaussians cannot be in %zu bytes", file->name, count,
                          file->size);
     unsigned char *streams = mem_alloc(count, row, "splats", err);
@@ -135,7 +138,7 @@ static gbt_status read_zipped(z_stream *z, const source_file *file, gaussian_clo
     return status;
 }
 
-/* In the axes that it has: those of the .ply it was made from, as nearly every writer keeps them. */
+/* Read versions 2 and 3. The axes are kept: nearly every writer uses those of the .ply it started from. */
 static gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
@@ -144,7 +147,7 @@ static gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_err
     if (file->size < 18 || file->bytes[0] != 0x1f || file->bytes[1] != 0x8b || file->size > UINT32_MAX / 2)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no .spz file (it does not begin as gzip does)",
                          file->name);
-    unsigned char *copy = mem_alloc(file->size, 1, "splats", err); /* zlib's pointer is not const */
+    unsigned char *copy = mem_alloc(file->size, 1, "splats", err); /* zlib's input pointer is not const */
     if (copy == NULL)
         return GBT_ERR_NO_MEMORY;
     memcpy(copy, file->bytes, file->size);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/spz_streams.c -- Gaussians to the streams of .spz and back. */
+/* data/spz_streams.c -- encodes Gaussians as the streams of .spz, and decodes them. */
 #include "data/spz_streams.h"
 
 #include <math.h>
@@ -8,10 +8,10 @@
 
 enum {
     FRACTION_BITS_MAX = 16,
-    COORDINATE_MAX = 8388607 /* 24 bits with a sign */
+    COORDINATE_MAX = 8388607 /* the range of signed 24-bit integers */
 };
 
-static const double color_step = 0.15; /* of f_dc, in units of 255 levels */
+static const double color_step = 0.15; /* in f_dc times this, 1 is 255 levels */
 
 void spz_row_bytes(const spz_header *header, size_t out[SPZ_STREAMS])
 {
@@ -24,7 +24,8 @@ void spz_row_bytes(const spz_header *header, size_t out[SPZ_STREAMS])
 
 static double scale_level(float scale_log) { return ((double)scale_log + 10) * 16; }
 
-/* Of a flat Gaussian the small scales do not matter. */
+/* Warn about scales outside the range of .spz. Only the largest scale of a Gaussian counts: the others may be
+   0 (flat) without harm. */
 static void warn_of_scales(const gaussian_cloud *cloud, const char *path)
 {
     size_t outside = 0;
@@ -59,8 +60,8 @@ gbt_status spz_header_of(const gaussian_cloud *cloud, const double origin[3], un
     return GBT_OK;
 }
 
-/* The largest of four components is left out, with the sign that makes it positive: 2 bits say which, then
-   sign and 9 bits for each other. */
+/* Smallest-three encoding: the component with the largest magnitude is made positive and dropped. 2 bits give
+   its index; each of the others takes a sign and 9 bits. */
 static uint32_t pack_rotation(const float wxyz[4])
 {
     const float q[4] = {wxyz[1], wxyz[2], wxyz[3], wxyz[0]};
@@ -79,7 +80,7 @@ static uint32_t pack_rotation(const float wxyz[4])
     return bits;
 }
 
-/* Steps of 8 in degree 1, of 16 above: what is left compresses. */
+/* Round SH coefficients to multiples of 8 levels in degree 1 and of 16 above, which compresses better. */
 static unsigned harmonic_byte(float value, size_t coefficient)
 {
     const int step = coefficient <= 3 ? 8 : 16;
@@ -171,7 +172,7 @@ gbt_status spz_unpack(const unsigned char *streams, const spz_header *header, ga
     spz_row_bytes(header, row);
     const unsigned char *at = streams, *alpha = at + 9 * n, *color = alpha + n, *scale = color + 3 * n,
                         *rotation = scale + 3 * n, *harmonics = rotation + row[4] * n;
-    out->sh_degree = header->degree < 3 ? header->degree : 3; /* what is above is left */
+    out->sh_degree = header->degree < 3 ? header->degree : 3; /* higher degrees are dropped */
     out->antialiased = header->flags & SPZ_ANTIALIASED;
     for (size_t i = 0; i < 3 * n; i++) {
         const uint32_t bits =

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/transforms.c -- transforms.json from bytes: its frames, their photos and masks, the split. */
+/* data/transforms.c -- reads transforms.json: its frames, their photos and masks, the split. */
 #include "data/transforms.h"
 
 #include <stdio.h>
@@ -9,7 +9,7 @@
 
 enum { NAME_SIZE = RAW_NAME_LIMIT + 1, PATH_SIZE = RAW_NAME_LIMIT + 4096, ENDING_SIZE = 8 };
 
-/* A leading ./ says nothing. */
+/* Skip leading "./". */
 static const char *plain_name(const char *name)
 {
     while (strncmp(name, "./", 2) == 0)
@@ -17,7 +17,7 @@ static const char *plain_name(const char *name)
     return name;
 }
 
-/* The same name as it is here, if Windows wrote it. */
+/* The name with backslashes replaced by slashes, in case it was written on Windows. */
 static const char *with_slashes(const char *name, char out[NAME_SIZE])
 {
     snprintf(out, NAME_SIZE, "%s", name);
@@ -26,7 +26,7 @@ static const char *with_slashes(const char *name, char out[NAME_SIZE])
     return plain_name(out);
 }
 
-/* The file of a name, with one of some endings. */
+/* Find the file `name`, trying the given endings in order. */
 static gbt_status find_file(const char *folder, const char *name, const char *const *endings,
                             char path[PATH_SIZE], bool *found, gbt_error *err)
 {
@@ -34,15 +34,16 @@ static gbt_status find_file(const char *folder, const char *name, const char *co
     *found = false;
     for (; *endings != NULL && !*found; endings++) {
         GBT_TRY(file_join(path, PATH_SIZE - ENDING_SIZE, folder, name, err));
-        strcat(path, *endings); /* the bytes left out above */
+        strcat(path, *endings); /* there is room: ENDING_SIZE bytes were kept free above */
         GBT_TRY(file_look(path, &kind, err));
         *found = kind == FILE_OTHER;
     }
     return GBT_OK;
 }
 
-/* The file that is `written`, or else the same with slashes for backslashes: here these are a letter like any
-   other. `name` is as it was found, or else with slashes, and `path` of the last that was tried. */
+/* Find the file `written`, or else the same name with slashes for backslashes (on Linux a backslash is an
+   ordinary character, so the literal name is tried first). `name` is set to the spelling last tried, which is
+   the one found, if any; `path` to the last path tried. */
 static gbt_status find_named(raw_place place, const char *what, const char *folder, const char *written,
                              const char *const *endings, char name[NAME_SIZE], char path[PATH_SIZE],
                              bool *found, gbt_error *err)
@@ -62,7 +63,7 @@ static gbt_status find_named(raw_place place, const char *what, const char *fold
 
 static const char *const as_it_is[] = {"", NULL}, *const photo_endings[] = {"", ".png", ".jpg", NULL};
 
-/* The frame's mask, or NULL when it names none. */
+/* Find the frame's mask; NULL when it names none. */
 static gbt_status find_mask(const transforms_frame *s, const char *folder, char **out, gbt_error *err)
 {
     *out = NULL;
@@ -111,7 +112,7 @@ static gbt_status read_frame(const transforms_frame *s, const char *folder, raw_
     return view->name != NULL && view->path != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* With a list train_filenames, every view that is not in it is held out. */
+/* If there is a list train_filenames, every view that is not in it is held out. */
 static gbt_status read_split(const source_file *file, const json_t *root, raw_scene *out, gbt_error *err)
 {
     const json_t *list = transforms_value(root, "train_filenames");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/transforms_camera.c -- the size and lens of one frame of a transforms.json. */
+/* data/transforms_camera.c -- reads the image size and lens of one frame of a transforms.json. */
 #include "data/transforms_camera.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "base/image_header.h"
 #include "base/vec.h"
 
-/* A number when the key is there; `*found` says whether it is. */
+/* A number, if the key is present; `*found` says whether it is. */
 static gbt_status find_number(const transforms_frame *s, const char *key, double *out, bool *found,
                               gbt_error *err)
 {
@@ -41,8 +41,8 @@ static gbt_status find_size(const transforms_frame *s, const char *key, int *out
     return GBT_OK;
 }
 
-/* camera_angle_x or _y, radians, else x_fov or y_fov, degrees, to a focal length in pixels; 0 when neither is
-   there. */
+/* The focal length in pixels from a field of view: camera_angle_x or _y in radians, else x_fov or y_fov in
+   degrees; 0 when neither is present. */
 static gbt_status focal_from_angle(const transforms_frame *s, char axis, int size, double *focal,
                                    gbt_error *err)
 {
@@ -71,8 +71,8 @@ static gbt_status focal_from_angle(const transforms_frame *s, char axis, int siz
     return GBT_OK;
 }
 
-/* What a file of this kind can say of a lens are the keys k1 to k4, p1 and p2: every model of them is taken,
-   and so is FULL_OPENCV, whose other coefficients are then 0. */
+/* A transforms.json can give the coefficients k1 to k4, p1 and p2. Models that use only these are supported,
+   and FULL_OPENCV with its other coefficients 0. */
 static bool is_supported(gbt_camera_model model)
 {
     const lens_kind kind = camera_model_of(model)->kind;
@@ -105,7 +105,8 @@ static gbt_status find_kind(const transforms_frame *s, lens_kind *kind, bool *is
 
 enum { K1, K2, K3, K4, P1, P2, LENS_COUNT };
 
-/* k1 k2 k3 k4 p1 p2, from keys of their own or from distortion_params in this order; absent ones are 0. */
+/* Read k1 k2 k3 k4 p1 p2 from their own keys or, in this order, from distortion_params; missing ones are 0.
+ */
 static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_COUNT], bool *any,
                                   gbt_error *err)
 {
@@ -127,7 +128,7 @@ static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_CO
     return GBT_OK;
 }
 
-/* The focal lengths: fl_x and fl_y, else the angles; a missing y follows x. */
+/* Read the focal lengths fl_x and fl_y, else derive them from angles; a missing y equals x. */
 static gbt_status find_focal(const transforms_frame *s, const gbt_camera *camera, double focal[2],
                              raw_scene *out, gbt_error *err)
 {

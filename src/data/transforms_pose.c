@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/transforms_pose.c -- the pose of one frame of a transforms.json, and its motion under a rolling
+/* data/transforms_pose.c -- reads the pose of one frame of a transforms.json, and its motion under a rolling
    shutter. */
 #include <math.h>
 
@@ -7,7 +7,7 @@
 #include "base/vec.h"
 #include "data/transforms_camera.h"
 
-/* Columns to an orthonormal matrix, Gram-Schmidt; only called when they nearly are one. */
+/* Gram-Schmidt orthonormalization of the columns; only called when they are nearly orthonormal. */
 static void orthonormalize(double m[9])
 {
     double column[3][3];
@@ -80,8 +80,8 @@ static gbt_status read_pose(const transforms_frame *s, const char *key, gbt_came
     orthonormalize(rotation);
     for (int i = 0; i < 3; i++) {
         camera->center[i] = m[i][3];
-        /* Rows of world-to-camera are columns of camera-to-world; y and z change sign between OpenGL's axes
-           and ours. */
+        /* The rows of world to camera are the columns of camera to world; y and z change sign because
+           OpenGL's camera axes point up and back, COLMAP's down and forward. */
         camera->rotation[0 + i] = rotation[3 * i];
         camera->rotation[3 + i] = -rotation[3 * i + 1];
         camera->rotation[6 + i] = -rotation[3 * i + 2];
@@ -89,8 +89,8 @@ static gbt_status read_pose(const transforms_frame *s, const char *key, gbt_came
     return GBT_OK;
 }
 
-/* a + b u + c v + d w is the time at which the image point (u, v), both in [0, 1], is taken, on the way from
-   the first pose (0) to the last (1). w spreads over the exposure, whose middle we take. */
+/* instant-ngp's rolling shutter: the image point (u, v), both in [0, 1], is taken at time a + b u + c v + d
+   w, where 0 is the first pose and 1 the last. w covers the exposure; we use its middle, w = 1/2. */
 static gbt_status read_times(const transforms_frame *s, double times[3], gbt_error *err)
 {
     static const char key[] = "rolling_shutter";

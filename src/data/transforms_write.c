@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/transforms_write.c -- a transforms.json of cameras that may move while they are read out. */
+/* data/transforms_write.c -- writes a transforms.json for cameras with a rolling shutter. */
 #include "data/transforms_write.h"
 
 #include <stdbool.h>
@@ -9,7 +9,7 @@
 #include "base/fail.h"
 #include "data/json_out.h"
 
-/* The pose at a share of the readout: camera to world, OpenGL's axes. NULL without memory. */
+/* The pose at the fraction `share` of the readout: camera to world, OpenGL's axes. NULL without memory. */
 static json_t *matrix_at(const gbt_camera *camera, double share)
 {
     const camera_pose pose = camera_pose_during(camera, share);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/unposed.c -- names of photos and films. */
+/* data/unposed.c -- recognises photos and films by the endings of their names. */
 #include "data/unposed.h"
 
 #include <dirent.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/unposed.h -- captures without camera poses, by their names: folders of photos, films. */
+/* data/unposed.h -- recognises captures without camera poses (folders of photos, films) by file names. */
 #ifndef GBT_DATA_UNPOSED_H
 #define GBT_DATA_UNPOSED_H
 
@@ -7,17 +7,19 @@
 
 #include "gbtrace/status.h"
 
-/** Whether a file name ends as those of photos do that can be read: .jpg, .jpeg, .png. */
+/** Whether the name has the ending of a photo format that can be read: .jpg, .jpeg, .png. */
 bool unposed_is_photo(const char *name);
 
-/** Whether a file name ends as those of photos do that cannot: .heic, .webp, .tif, raw ones and others. */
+/** Whether the name has the ending of a photo format that cannot be read: .heic, .webp, .tif, raw formats and
+    others. */
 bool unposed_is_other_photo(const char *name);
 
-/** Whether a folder has a photo of such a name, or a folder in it, `depth` levels down at most. */
+/** Whether a folder, or its subfolders to a depth of `depth`, contains a file that unposed_is_photo()
+    accepts. */
 bool unposed_has_photos(const char *folder, int depth);
 
-/** When `path` is no data set, but a capture: GBT_ERR_FORMAT, with the command that finds its poses. Else
-    GBT_OK. */
+/** When `path` is a capture instead of a data set: GBT_ERR_FORMAT, with the command that finds its poses.
+    Otherwise GBT_OK. */
 gbt_status unposed_check(const char *path, gbt_error *err);
 
 #endif

@@ -1,26 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/usd.h -- USD scenes with a prim ParticleField3DGaussianSplat (OpenUSD 26.03), as text (.usda) or as
+/* data/usd.h -- USD scenes with a ParticleField3DGaussianSplat prim (OpenUSD 26.03), as text (.usda), or as
    text in a package (.usdz).
 
-   The prim has the axes of the data set; half a turn about z puts them into USD's, whose y is up. The scene's
-   origin is a translation in double, so that coordinates of a country are kept. */
+   The prim keeps the data set's axes; a rotation by 180 degrees about z converts them to USD's, where y is
+   up. The scene's origin is a translation in double, so that large coordinates, such as those of a national
+   grid, stay accurate. */
 #ifndef GBT_DATA_USD_H
 #define GBT_DATA_USD_H
 
 #include "data/bytes.h"
 #include "data/gaussian_cloud.h"
 
-/** The near distance: an attribute of our own, which others pass over. */
+/** The near distance: an attribute of our own, which other programs ignore. */
 #define USD_NEAR "gbtrace:near"
 
 /**
- * As gaussian_format.read: the first such prim of a text. Its coordinates are read with its translation; a
- * transformation of another kind is left out, with a warning, if it is not that half turn, and so are all
- * transformations of the prims that it is in.
+ * Read the first such prim of a text, as gaussian_format.read. Its translation becomes the origin. Its other
+ * transformations, except that half turn, are ignored with a warning, and so are all transformations of its
+ * parents.
  */
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
-/** The first .usda in a package. */
+/** Read the first .usda in a package. */
 gbt_status usdz_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/usd_read.c -- the first prim of Gaussians in a USD text: its arrays of numbers, and its place. */
+/* data/usd_read.c -- reads the first prim of Gaussians in a USD text: its arrays and its translation. */
 #include <math.h>
 #include <stdio.h>
 
@@ -13,7 +13,7 @@ static const char prim_type[] = "ParticleField3DGaussianSplat";
 
 /* ---- tokens ---- */
 
-/* A word, a text in quotes, or one character of punctuation. */
+/* A word, a string in quotes, or one punctuation character. */
 typedef struct token {
     const char *at;
     size_t length;
@@ -28,7 +28,7 @@ static bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c ==
 
 static bool is_single(char c) { return c != '\0' && strchr("()[]{}=;", c) != NULL; }
 
-/* Blanks, commas and comments. */
+/* Skip blanks, commas and comments. */
 static void skip_blanks(reading *r)
 {
     while (r->at < r->end && (is_blank(*r->at) || *r->at == '#')) {
@@ -40,7 +40,7 @@ static void skip_blanks(reading *r)
     }
 }
 
-/* Behind the quotes that close the text at `from`, which may be three. */
+/* The end of the string that starts at `from`, behind its closing quotes; quotes may be single or triple. */
 static const char *behind_quotes(const reading *r, const char *from)
 {
     const char quote = *from;
@@ -55,7 +55,7 @@ static const char *behind_quotes(const reading *r, const char *from)
     return r->end;
 }
 
-/* False at the end. */
+/* Read the next token; false at the end of the text. */
 static bool next(reading *r, token *out)
 {
     skip_blanks(r);
@@ -80,7 +80,7 @@ static bool is(token t, const char *text)
     return t.length == strlen(text) && memcmp(t.at, text, t.length) == 0;
 }
 
-/* Behind the bracket that closes the one before, of whatever kind. */
+/* Skip to behind the bracket that closes the one just read, counting brackets of all kinds. */
 static void skip_group(reading *r)
 {
     token t;
@@ -94,7 +94,7 @@ static gbt_status fail(const reading *r, const char *what, gbt_error *err)
                      (size_t)(r->at - (const char *)r->file->bytes), what);
 }
 
-/* ---- what a prim has ---- */
+/* ---- the attributes of a prim ---- */
 
 typedef enum field_id {
     POSITIONS,
@@ -108,7 +108,9 @@ typedef enum field_id {
     FIELDS
 } field_id;
 
-/* Names of the arrays; with an h behind they have less precision, and count where the others are not there.
+/*
+ * Names of the attributes. An array with an "h" appended to its name has half precision, and is used only if
+ * there is no full one.
  */
 static const struct {
     const char *name;
@@ -123,14 +125,14 @@ static const struct {
                     {USD_NEAR, 1}};
 
 typedef struct numbers {
-    float *values; /* of arrays */
+    float *values; /* numbers of an array */
     size_t count, capacity;
 } numbers;
 
 typedef struct prim {
     numbers fields[FIELDS];
-    double translate[3]; /* all its digits */
-    bool other_place;    /* a transformation that is not read */
+    double translate[3]; /* in double */
+    bool other_place;    /* there is a transformation that is ignored */
 } prim;
 
 static field_id field_of(token name, bool *half)
@@ -163,7 +165,7 @@ static gbt_status add_number(reading *r, prim *p, field_id f, token t, gbt_error
     return GBT_OK;
 }
 
-/* A number, or all numbers in brackets. */
+/* Read a number, or all numbers in brackets. */
 static gbt_status take_numbers(reading *r, prim *p, field_id f, gbt_error *err)
 {
     token t;
@@ -182,7 +184,7 @@ static gbt_status take_numbers(reading *r, prim *p, field_id f, gbt_error *err)
     return GBT_OK;
 }
 
-/* Any value but those that are read. */
+/* Skip a value that is not used. */
 static void skip_value(reading *r)
 {
     token t;
@@ -190,7 +192,7 @@ static void skip_value(reading *r)
         skip_group(r);
 }
 
-/* The name of a transformation. */
+/* Whether the token names a transformation. */
 static bool is_place(token t)
 {
     static const char place[] = "xformOp:";
@@ -213,7 +215,7 @@ static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
     return take_numbers(r, p, f, err);
 }
 
-/* Between the braces of the prim. */
+/* Read the attributes between the braces of the prim. */
 static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
 {
     token t, before = {.at = r->at};
@@ -223,18 +225,19 @@ static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
         if (is(t, "="))
             GBT_TRY(take_value(r, p, before, err));
         else if (is(t, "(") || is(t, "[") || is(t, "{"))
-            skip_group(r); /* of metadata, and of prims inside; a type's [] */
+            skip_group(r); /* metadata, a child prim, or the [] of an array type */
         before = is(t, "]") ? before : t;
     }
     return fail(r, "the text ends inside the prim", err);
 }
 
-/* To the first prim of Gaussians: behind its brace. `depth`: the number of prims that it is in. */
+/* Advance to behind the opening brace of the first prim of Gaussians. `depth`: the number of its ancestors.
+ */
 static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
 {
     token t;
     bool defined = false;
-    int placed = 0; /* the depth of the outermost of these that has a transformation */
+    int placed = 0; /* depth of the outermost ancestor with a transformation; 0: none */
     while (next(r, &t)) {
         if (is(t, "}"))
             placed = *depth == placed ? 0 : placed;
@@ -254,7 +257,7 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
     return base_fail(err, GBT_ERR_FORMAT, "%s: has no prim of the type %s", r->file->name, prim_type);
 }
 
-/* Whether a prim that the one before is in has a transformation that stands behind it. */
+/* Whether an ancestor of the prim just read has a transformation that comes later in the text. */
 static bool placed_behind(reading *r, int depth)
 {
     token t;
@@ -284,7 +287,7 @@ static gbt_status check(const reading *r, const prim *p, size_t *functions, gbt_
                              "%s: %zu numbers in %s (wanted %zu for each of %zu positions)", r->file->name,
                              p->fields[f].count, fields[f].name, fields[f].width, count);
     const numbers *degree = &p->fields[DEGREE], *sh = &p->fields[HARMONICS];
-    const float value = degree->count == 1 ? degree->values[0] : 3; /* the schema's own default */
+    const float value = degree->count == 1 ? degree->values[0] : 3; /* the schema's default */
     if (!(value >= 0 && value <= 3))
         return base_fail(err, GBT_ERR_FORMAT, "%s: harmonics of degree %g (wanted 0 to 3)", r->file->name,
                          (double)value);
@@ -320,7 +323,7 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     GBT_TRY(check(r, p, &functions, err));
     const size_t count = p->fields[POSITIONS].count / 3;
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
-    out->count = 0; /* of those that are usable */
+    out->count = 0; /* counts the usable rows from here on */
     memcpy(out->origin, p->translate, sizeof out->origin);
     if (p->fields[NEAR].count == 1)
         out->near = gaussian_cloud_near((double)p->fields[NEAR].values[0]);

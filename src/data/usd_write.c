@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/usd_write.c -- Gaussians as USD text: one array of numbers after the other. */
+/* data/usd_write.c -- writes Gaussians as USD text, one array after the other. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -25,7 +25,7 @@ static void put(sink *s, const char *format, ...)
     sink_put_text(s, text);
 }
 
-/* A tuple of `width` numbers for each of `count`; 9 digits tell two floats apart. */
+/* Write an array of `count` tuples of `width` numbers. 9 digits are enough to tell any two floats apart. */
 static void put_array(sink *s, const char *type_and_name, const float *values, size_t count, size_t width)
 {
     put(s, "    %s = [", type_and_name);
@@ -103,7 +103,8 @@ static gbt_status put_text(sink *s, const gaussian_cloud *cloud, const double or
     return s->status;
 }
 
-/* Write one; `origin` is its translation. GBT_ERR_ARGUMENT for a .usdz beyond 4 GiB. */
+/* Write a .usda or .usdz; `origin` becomes the prim's translation. GBT_ERR_ARGUMENT for a .usdz beyond 4 GiB.
+ */
 static gbt_status write_usd(const char *path, const gaussian_cloud *cloud, const double origin[3],
                             bool packaged, gbt_error *err)
 {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/webp.c -- lossless, and what no alpha shows is kept. */
+/* data/webp.c -- lossless WebP that also keeps the colours of transparent pixels. */
 #include "data/webp.h"
 
 #include <webp/decode.h>
 #include <webp/encode.h>
 
-enum { EFFORT = 6 }; /* of 0 to 9: beyond, twice the time for a hundredth of the size */
+enum { EFFORT = 6 }; /* of 0 to 9; more takes twice the time for 1 % less size */
 
 gbt_status webp_put(sink *out, const webp_table *table, gbt_error *err)
 {

@@ -13,7 +13,10 @@
 #include "data/sog.h"
 #include "data/webp.h"
 
-enum { FILES_MAX = 8, GAUSSIANS_PER_ENTRY = 4 /* in the palette, unless limited to 1 for each */ };
+enum {
+    FILES_MAX = 8,
+    GAUSSIANS_PER_ENTRY = 4 /* for each palette entry, within 1,024 to SOG_PALETTE_MAX entries */
+};
 
 typedef struct writing {
     const gaussian_cloud *cloud;

@@ -11,7 +11,7 @@ enum {
     COORDINATE_MAX = 8388607 /* the range of signed 24-bit integers */
 };
 
-static const double color_step = 0.15; /* in f_dc times this, 1 is 255 levels */
+static const double color_step = 0.15; /* byte = 255 (0.15 f_dc + 0.5) */
 
 void spz_row_bytes(const spz_header *header, size_t out[SPZ_STREAMS])
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/attribute_code.c -- attributes to bits and back. */
+/* io/attribute_code.c -- predicts and codes the quantized attributes of anchors. */
 #include "io/attribute_code.h"
 
 #include <stdbool.h>
@@ -60,7 +60,7 @@ void attribute_find_near(attribute_table *t, const uint64_t *codes)
             best[place] = apart;
             t->near[i][place] = (uint32_t)(i - back);
         }
-        for (int k = 1; k < ATTRIBUTE_NEAR; k++) /* the first rows have fewer */
+        for (int k = 1; k < ATTRIBUTE_NEAR; k++) /* the first rows have fewer neighbours */
             if (best[k] == UINT64_MAX)
                 t->near[i][k] = t->near[i][0];
         for (int k = 0; k < 3; k++)
@@ -70,7 +70,8 @@ void attribute_find_near(attribute_table *t, const uint64_t *codes)
 
 /* ---- one value ---- */
 
-/* Shifts of negative numbers to the right round down, with every compiler that builds this. */
+/* The predicted value of a column. Rounding relies on right shifts of negative numbers rounding down, as all
+   supported compilers do. */
 static int64_t expect(const attribute_table *t, size_t row, size_t column)
 {
     const size_t columns = (size_t)t->columns;
@@ -85,7 +86,7 @@ static int64_t expect(const attribute_table *t, size_t row, size_t column)
     return sum > ATTRIBUTE_MAX ? ATTRIBUTE_MAX : sum < -ATTRIBUTE_MAX ? -ATTRIBUTE_MAX : sum;
 }
 
-/* Twice the logarithm, coarsely: 0, 1, 2, 3, 4-5, 6-7, 8-11, ... */
+/* About twice the base-2 logarithm: a bucket each for 0, 1, 2, 3, 4-5, 6-7, 8-11, ... */
 static size_t bucket(uint64_t x)
 {
     if (x < 2)
@@ -104,7 +105,7 @@ typedef struct column_models {
 } column_models;
 
 typedef struct attribute_models {
-    coder_int_model by_row[BUCKETS][ATTRIBUTE_DOUBLINGS]; /* for all columns of a part */
+    coder_int_model by_row[BUCKETS][ATTRIBUTE_DOUBLINGS]; /* shared by all columns of a part */
     column_models column[];
 } attribute_models;
 
@@ -123,7 +124,7 @@ static attribute_models *make_models(int columns, gbt_error *err)
     return m;
 }
 
-/* How far the neighbours were from what was expected of them, in steps of this row. */
+/* A context from the neighbours' prediction errors in this column, in steps of this row. */
 static size_t bucket_near(const attribute_table *t, size_t row, size_t column)
 {
     const size_t columns = (size_t)t->columns;
@@ -142,7 +143,7 @@ gbt_status attribute_code_columns(range_coder *c, attribute_table *t, int begin,
     bool good = true;
     for (size_t row = 0; row < t->rows && good; row++) {
         const int d = t->doubling[row];
-        uint32_t recent[RECENT] = {0}; /* what was left of the last columns of this row, in its steps */
+        uint32_t recent[RECENT] = {0}; /* prediction errors| of the last columns of this row, in its steps */
         for (int column = begin; column < end && good; column++) {
             const size_t at = row * columns + (size_t)column;
             column_models *own = &m->column[column - begin];

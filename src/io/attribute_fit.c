@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/attribute_fit.c -- the rules that predict attributes: ridge regression of every column on what is known
-   before it. */
+/* io/attribute_fit.c -- fits the rules that predict attributes: ridge regression of every column on the
+   values that are known before it. */
 #include <math.h>
 
 #include "base/memory.h"
 #include "base/symmetric.h"
 #include "io/attribute_code.h"
 
-enum { UNKNOWNS_MAX = ATTRIBUTE_INPUTS_MAX + 1, ROWS_MAX = 20000 /* as many say enough */ };
+enum { UNKNOWNS_MAX = ATTRIBUTE_INPUTS_MAX + 1, ROWS_MAX = 20000 /* a sample of this size is enough */ };
 
 typedef struct fit {
     double normal[UNKNOWNS_MAX * UNKNOWNS_MAX], right[UNKNOWNS_MAX], input[UNKNOWNS_MAX];
@@ -19,7 +19,7 @@ static int32_t rounded(double x)
     return (int32_t)lrint(fmin(fmax(x, -most), most));
 }
 
-/* Inputs: one, column of the neighbours, columns before. */
+/* The inputs are 1 (for the bias), the column in the neighbour rows, and the earlier columns of the row. */
 static void fit_column(attribute_table *t, size_t column, fit *f)
 {
     const size_t columns = (size_t)t->columns, n = 1 + ATTRIBUTE_NEAR + column,

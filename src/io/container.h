@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/container.h -- one file format for everything that we save: named, typed, checksummed arrays.
+/* io/container.h -- the file format for everything that we save: named, typed, checksummed arrays.
 
    Layout (little endian; io/container_format.h): a 64-byte header, a table of 128 bytes per section, then the
-   sections, each on a multiple of 64 bytes, in table order, zeros between. The layout follows from the table
-   alone and every byte is under a checksum or must be zero, so any changed byte, cut or appended file is
-   found. */
+   sections in table order, each at a multiple of 64 bytes with zeros between. The table determines the whole
+   layout, and every byte is either covered by a checksum or must be zero, so any changed byte and any
+   truncated or extended file is detected. */
 #ifndef GBT_IO_CONTAINER_H
 #define GBT_IO_CONTAINER_H
 
@@ -20,10 +20,10 @@ enum {
     CONTAINER_MAX_SECTIONS = 4096
 };
 
-/** In a wanted shape: any size will do. */
+/** As a requested size: any size is accepted. */
 #define CONTAINER_ANY SIZE_MAX
 
-/** The numbers are in files: never renumber. */
+/** These numbers are in files: never renumber. */
 typedef enum container_dtype {
     CONTAINER_F32 = 1,
     CONTAINER_F64 = 2,
@@ -45,7 +45,7 @@ typedef struct container_section {
 
 /* ---- writing ---- */
 
-/** Collects sections. Start from `container_writer w = {0};`; the first failure is kept and comes out of
+/** Collects sections. Start from `container_writer w = {0};`. The first failure is kept and returned by
     container_save(). */
 typedef struct container_writer {
     size_t count, capacity;
@@ -64,19 +64,19 @@ typedef struct container_writer {
 void container_add(container_writer *w, const char *name, container_dtype dtype, int dim_count,
                    const size_t *dims, const void *data);
 
-/** Add up to CONTAINER_SMALL_BYTES bytes as a vector; they are copied, so temporaries will do. */
+/** Add up to CONTAINER_SMALL_BYTES bytes as a vector. They are copied, so a temporary may be passed. */
 void container_add_small(container_writer *w, const char *name, container_dtype dtype, size_t count,
                          const void *data);
 
 /** Add a string without its final zero as a vector of CONTAINER_U8; borrowed like container_add(). */
 void container_add_text(container_writer *w, const char *name, const char *text);
 
-/** The file in memory; free `*bytes` with mem_free(). Cost: one copy of everything. */
+/** Make the file in memory; free `*bytes` with mem_free(). Cost: one copy of everything. */
 gbt_status container_encode(const container_writer *w, unsigned char **bytes, size_t *byte_count,
                             gbt_error *err);
 
-/** Write the file atomically (file_write_atomic()). GBT_ERR_ARGUMENT for a bad container_add(), else what
-    memory and disk say. */
+/** Write the file atomically (file_write_atomic()). GBT_ERR_ARGUMENT for an invalid container_add();
+    GBT_ERR_NO_MEMORY and GBT_ERR_IO. */
 gbt_status container_save(const container_writer *w, const char *path, gbt_error *err);
 
 void container_writer_free(container_writer *w);
@@ -87,18 +87,18 @@ typedef struct container {
     size_t count;
     container_section *sections; /* data points into the file's bytes */
     const char *path;            /* for messages; borrowed */
-    unsigned char *owned;        /* the file's bytes, if container_load() read them */
+    unsigned char *owned;        /* the file's bytes, if container_load() read them; else NULL */
 } container;
 
 /**
- * Check a file in memory whole: header, table, layout, every checksum.
+ * Check a complete file in memory: header, table, layout and every checksum.
  *
  * @param bytes [in]  borrowed until container_free(); on a multiple of 8 bytes, as mem_alloc() gives
  * @param path  [in]  what messages call it; borrowed until container_free()
  * @param out   [out] zeroed on failure
  * @return GBT_OK, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY, GBT_ERR_ARGUMENT (alignment)
- * Cost: one pass over the bytes; allocates 216 bytes a section, never more than the file's own table has room
- * for.
+ * Cost: one pass over the bytes; allocates 216 bytes per section, of which there are at most as many as the
+ * file has room for.
  */
 gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const char *path, container *out,
                            gbt_error *err);
@@ -107,13 +107,13 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
     until container_free(). */
 gbt_status container_load(const char *path, container *out, gbt_error *err);
 
-/** NULL if there is no such section. */
+/** The section with this name; NULL if there is none. */
 const container_section *container_section_named(const container *c, const char *name);
 
 /**
- * The data of a section of a wanted type and shape.
+ * The data of a section, which must have the given type and shape.
  *
- * @param dims [in,out] [dim_count] wanted sizes; CONTAINER_ANY is replaced by the size that is there
+ * @param dims [in,out] [dim_count] required sizes; CONTAINER_ANY is replaced by the actual size
  * @param data [out]    borrowed until container_free(); aligned for its type; NULL on failure
  * @return GBT_OK or GBT_ERR_FORMAT with file, section, wanted and got
  */
@@ -124,7 +124,7 @@ gbt_status container_find(const container *c, const char *name, container_dtype 
 gbt_status container_get(const container *c, const char *name, container_dtype dtype, size_t count, void *out,
                          gbt_error *err);
 
-/** Copy a string out and end it with zero; refused if it does not fit or holds a zero. */
+/** Copy a string and terminate it with zero. Fails if it does not fit or contains a zero. */
 gbt_status container_get_text(const container *c, const char *name, char *out, size_t size, gbt_error *err);
 
 void container_free(container *c);

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/container_format.h -- the bytes of a container: header, row of the table, sizes; for its reader and
-   writer.
+/* io/container_format.h -- the byte layout of a container, shared by its reader and its writer.
 
-   [header 64][table 128 x count][section 0][zeros][section 1]...   every part starts on a multiple of 64 */
+   [header 64][table 128 x count][section 0][zeros][section 1]...   every part starts at a multiple of 64 */
 #ifndef GBT_IO_CONTAINER_FORMAT_H
 #define GBT_IO_CONTAINER_FORMAT_H
 
@@ -26,15 +25,15 @@ typedef struct container_header {
     uint64_t file_bytes;
     uint32_t table_crc;
     uint32_t zero[8];
-    uint32_t crc; /* of the 60 bytes before; at the same place in every version */
+    uint32_t crc; /* of the 60 bytes before; at the same offset in every version */
 } container_header;
 _Static_assert(sizeof(container_header) == 64, "the header is 64 bytes");
 
 typedef struct container_row {
-    char name[CONTAINER_NAME_SIZE]; /* zeros after the end */
+    char name[CONTAINER_NAME_SIZE]; /* padded with zeros */
     uint32_t dtype;
     uint32_t dim_count;
-    uint64_t dims[CONTAINER_MAX_DIMS]; /* zeros after dim_count */
+    uint64_t dims[CONTAINER_MAX_DIMS]; /* zeros after dim_count sizes */
     uint64_t offset;
     uint64_t byte_count;
     uint32_t crc;
@@ -63,8 +62,8 @@ static inline size_t container_dtype_size(container_dtype dtype)
     return 0;
 }
 
-/** Size in bytes of a shape; false if it overflows. Zero sizes do not excuse an overflow of the others: no
-    honest file has that. */
+/** Size in bytes of an array; false if it overflows. A size of 0 does not excuse an overflow of the other
+    factors: no valid file has that. */
 static inline bool container_shape_bytes(container_dtype dtype, int dim_count, const size_t *dims,
                                          size_t *out)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/container_read.c -- bytes to named, typed arrays, every byte of them checked. */
+/* io/container_read.c -- reads a container: checks every byte, and finds the named arrays in it. */
 #include <stdio.h>
 #include <string.h>
 
@@ -9,7 +9,8 @@
 #include "base/paged.h"
 #include "io/container_format.h"
 
-/* A fuzzer finds no checksum, and what is behind it must hold without. */
+/* In builds for fuzzing checksums are not compared: a fuzzer cannot guess them, and the code behind them has
+   to withstand any bytes anyway. */
 static bool is_sound(uint32_t wanted, const void *bytes, size_t count)
 {
 #ifdef FUZZING_BUILD_MODE_UNSAFE_FOR_PRODUCTION
@@ -68,7 +69,8 @@ static gbt_status check_header(const unsigned char *bytes, size_t byte_count, co
     return GBT_OK;
 }
 
-/** Row `i` of the table to a section; `*end` is where the parts before it end and is moved on. */
+/** Read row `i` of the table into a section. `*end` is the end of the preceding parts, and is moved to the
+    end of this section. */
 static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const char *path, size_t i,
                             size_t *end, container_section *s, gbt_error *err)
 {
@@ -170,7 +172,7 @@ const container_section *container_section_named(const container *c, const char 
     return NULL;
 }
 
-/** "f32[4][3]", with * for any size. */
+/** Format a type and shape as "f32[4][3]", with * for any size. */
 static void describe(container_dtype dtype, int dim_count, const size_t *dims, char *out, size_t size)
 {
     size_t used = (size_t)snprintf(out, size, "%s", dtype_name(dtype));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/container_write.c -- named, typed, checksummed arrays to bytes. */
+/* io/container_write.c -- writes a container of named, typed, checksummed arrays. */
 #include <string.h>
 
 #include "base/fail.h"
@@ -77,7 +77,7 @@ void container_add_text(container_writer *w, const char *name, const char *text)
     container_add(w, name, CONTAINER_U8, 1, &length, text);
 }
 
-/* What stands before the sections: the header and the rows of the table. Free with mem_free(). */
+/* The header and the table, which precede the sections. Free with mem_free(). */
 static container_header *make_head(const container_writer *w, size_t *head_bytes, gbt_error *err)
 {
     const size_t table_bytes = w->count * sizeof(container_row);
@@ -131,7 +131,8 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
     if (head == NULL)
         return GBT_ERR_NO_MEMORY;
     const container_row *rows = (const container_row *)(const void *)(head + 1);
-    unsigned char *file = mem_calloc(head->file_bytes, 1, "file image", err); /* zeros: the gaps */
+    unsigned char *file =
+        mem_calloc(head->file_bytes, 1, "file image", err); /* zeroed: the gaps between sections must be 0 */
     if (file != NULL) {
         memcpy(file, head, head_bytes);
         for (size_t i = 0; i < w->count; i++)
@@ -144,7 +145,7 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
     return file != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
-/* Section by section: what is saved may be larger than the memory that is left. */
+/* Written section by section, because a copy of everything might not fit in memory. */
 static gbt_status put_sections(const container_writer *w, const container_header *head, size_t head_bytes,
                                large_file *file, gbt_error *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/float_code.c -- floats to bits and back, losslessly. */
+/* io/float_code.c -- losslessly codes floats and decodes them. */
 #include "io/float_code.h"
 
 #include <string.h>
@@ -10,7 +10,8 @@ enum { BYTE_VALUES = 256 };
 
 gbt_status floats_code(range_coder *c, float *values, size_t rows, size_t columns, gbt_error *err)
 {
-    const size_t trees = columns + BYTE_VALUES; /* the first byte by column, the second by the first */
+    const size_t trees =
+        columns + BYTE_VALUES; /* contexts of the first byte: the column; of the second: the first byte */
     coder_bit_model(*tree)[BYTE_VALUES] = mem_alloc(trees, sizeof *tree, "float contexts", err);
     if (tree == NULL)
         return GBT_ERR_NO_MEMORY;

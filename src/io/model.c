@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model.c -- the end of a model. */
+/* io/model.c -- frees a model. */
 #include "io/model.h"
 
 #include <string.h>

@@ -12,15 +12,15 @@ enum { MODEL_FOLDER_SIZE = 1024, MODEL_CONFIG_SIZE = 4096 };
 
 typedef struct model {
     anchors anchors;
-    float *anchor_pixel; /* optional (NULL), [anchors.count]: smallest pixel with which training saw an
-                            anchor, scene units, >= 0; 0: none did */
+    float *anchor_pixel; /* optional (NULL), [anchors.count]: smallest pixel footprint at which a training
+                            view saw the anchor, scene units, >= 0; 0: none saw it */
     decoder decoder;     /* decoder.offset_count equals anchors.offset_count */
     double origin[3];    /* world = local + origin */
     float voxel_size;    /* v, scene units, >= 0 */
-    float extent;        /* of the training cameras, scene units, >= 0 */
+    float extent;        /* extent of the training cameras, scene units, >= 0 */
     float background[3];
-    sky sky;                             /* what is added to it by direction */
-    float t_near;                        /* scene units, >= 0 */
+    sky sky;      /* light from far away, which depends on the direction; added to `background` */
+    float t_near; /* scene units, >= 0 */
     char data_folder[MODEL_FOLDER_SIZE]; /* the data set it was trained on */
     char config[MODEL_CONFIG_SIZE];      /* key = value lines: how it was trained */
     uint64_t iterations;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_code.c -- the small forms of a model: parts of bytes, and the sections around them. */
+/* io/model_code.c -- codes a model in the two small forms, and decodes it. */
 #include "io/model_code.h"
 
 #include <math.h>
@@ -9,25 +9,25 @@
 #include "base/memory.h"
 #include "io/model_parts.h"
 
-/* Places in coded.shape. */
+/* Indices into coded.shape. */
 enum { SHAPE_FORM, SHAPE_COUNT, SHAPE_OFFSETS, SHAPE_PIXELS, SHAPE_LEVELS, SHAPE_NUMBERS };
 /* Values of SHAPE_FORM. */
 enum { FORM_COARSE = 1, FORM_LOSSLESS = 2 };
-/* Places in coded.steps: the corner of the cube, the side of a cell, then the columns of the table. */
+/* Indices into coded.steps: the corner of the cube, the side of a cell, then the step of each column. */
 enum { STEPS_ORIGIN, STEPS_CELL = 3, STEPS_COLUMNS };
-/* More anchors than this in so few bytes are a forgery, and are not allocated. A real one takes bytes, not
-   half a bit. */
+/* A file that claims more anchors than ANCHORS_ANYWAY + ANCHORS_PER_BYTE x its bytes is rejected before
+   anything is allocated. A real anchor takes several bytes, not half a bit. */
 enum { ANCHORS_ANYWAY = 65536, ANCHORS_PER_BYTE = 16 };
 
 _Static_assert(SHAPE_NUMBERS == sizeof((model_coded){0}.shape) / sizeof(uint32_t),
                "the shape has its places");
 
-/* ---- parts of bytes ---- */
+/* ---- parts ---- */
 
-/* Adds what a coder has written as the next part. */
+/* Append what a coder has written as the next part. */
 static gbt_status add_part(model_coded *out, size_t *size, int part, range_coder *c, gbt_error *err)
 {
-    size_t capacity = *size; /* exact: the parts are few */
+    size_t capacity = *size; /* reallocated to the exact size each time, because there are few parts */
     GBT_TRY(coder_write_end(c, err));
     if (c->size > UINT32_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "the model is too large to be coded");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_file.c -- the scene model to sections and back, with every value checked on the way in. */
+/* io/model_file.c -- writes a model as sections of a container and reads it back, checking every value. */
 #include "io/model_file.h"
 
 #include <math.h>
@@ -12,11 +12,11 @@
 #include "io/model_code.h"
 #include "io/row_sections.h"
 
-/* Scalars travel in three vectors; the enums name their places. */
+/* Scalars are stored in three vectors; the enums are indices into them. */
 enum { SCENE_VOXEL_SIZE, SCENE_EXTENT, SCENE_T_NEAR, SCENE_BACKGROUND, SCENE_NUMBERS = SCENE_BACKGROUND + 3 };
 enum { DECODER_DISTANCE_SCALE, DECODER_DISTANCE_MIN, DECODER_DISTANCE_MAX, DECODER_NUMBERS };
 
-/* All but anchors and the networks' parameters. */
+/* Add everything except the anchors and the network parameters. */
 static void add_scene(container_writer *w, const model *m)
 {
     const decoder *d = &m->decoder;
@@ -54,7 +54,8 @@ static gbt_status check_finite(const char *path, const char *section, const floa
     return GBT_OK;
 }
 
-/** What every part of the program may rely on; `failure` says whose fault it is. */
+/** Check all that the rest of the program relies on. `failure` is the status to return: GBT_ERR_ARGUMENT or
+    GBT_ERR_FORMAT, depending on where the model came from. */
 static gbt_status check_model(const char *path, const model *m, gbt_status failure, gbt_error *err)
 {
     const anchors *a = &m->anchors;
@@ -64,7 +65,7 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
             err, failure,
             "%s: section anchor.offset: bad number of offsets per anchor (wanted 1 to %d, got %d)", path,
             ANCHOR_MAX_OFFSETS, a->offset_count);
-    if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS) /* Gaussians have 32-bit ids */
+    if (a->count > UINT32_MAX / ANCHOR_MAX_OFFSETS) /* Gaussian ids have 32 bits */
         return base_fail(err, failure,
                          "%s: section anchor.position: too many anchors (wanted at most %u, got %zu)", path,
                          UINT32_MAX / ANCHOR_MAX_OFFSETS, a->count);
@@ -100,7 +101,7 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
     for (size_t i = 0; m->anchor_pixel != NULL && i < a->count; i++)
         if (m->anchor_pixel[i] < 0)
             return base_fail(err, failure, "%s: section anchor.pixel: value %zu is negative", path, i);
-    if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite: not limited */
+    if (isnan(d->distance_min) || isnan(d->distance_max)) /* infinite is allowed: no limit */
         return base_fail(err, failure,
                          "%s: section decoder.numbers: the trained range of distances is not a number", path);
     if (m->voxel_size < 0 || m->extent < 0 || m->t_near < 0)
@@ -123,7 +124,7 @@ gbt_status model_save(const char *path, const model *m, gbt_error *err)
     return status;
 }
 
-/* Same bits in all that the coded parts hold? */
+/* Whether the coded parts of two models are equal to the bit. */
 static bool same_parts(const model *a, const model *b)
 {
     const size_t n = a->anchors.count;
@@ -141,7 +142,8 @@ static bool same_parts(const model *a, const model *b)
            memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0;
 }
 
-/* Read what is about to be written: a model that cannot come back is not saved. */
+/* Read back the bytes that are about to be written: a model that cannot be read must not replace a good file.
+ */
 static gbt_status check_bytes(const char *path, const unsigned char *bytes, size_t byte_count,
                               const model *wanted, gbt_error *err)
 {
@@ -223,7 +225,7 @@ static gbt_status read_anchors(const container *c, anchors *a, gbt_error *err)
     return GBT_OK;
 }
 
-/* Models that were not trained with a footprint do not have it. */
+/* The section is missing in models trained without pixel footprints. */
 static gbt_status read_anchor_pixel(const container *c, size_t count, float **out, gbt_error *err)
 {
     const void *pixel;
@@ -283,7 +285,7 @@ static gbt_status read_coded(const container *c, model *m, gbt_error *err)
     return model_decode(c, m->decoder.has_distance, m, err);
 }
 
-/* Models with a background of one colour have none. */
+/* The section is missing in models with a background of one colour. */
 static gbt_status read_sky(const container *c, sky *out, gbt_error *err)
 {
     const void *data;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_file.h -- the scene model in a file: plain, or in one of the two small forms. */
+/* io/model_file.h -- saves and loads a model: uncompressed, or in one of the two small forms. */
 #ifndef GBT_IO_MODEL_FILE_H
 #define GBT_IO_MODEL_FILE_H
 
@@ -7,37 +7,39 @@
 #include "io/container.h"
 #include "io/model.h"
 
-/** Save atomically: after any failure the old file is whole. GBT_ERR_ARGUMENT if the model is not one that
-    model_load() would take. */
+/** Save atomically: after any failure the old file is intact. GBT_ERR_ARGUMENT if model_load() would reject
+    the model. */
 gbt_status model_save(const char *path, const model *m, gbt_error *err);
 
-/** Bytes of a coded model by what they hold. */
+/** How many bytes of a coded model each kind of content takes. */
 typedef struct model_sizes {
     size_t positions, features, offsets, scales, pixels, networks;
-    size_t steps; /* of each anchor, and the rules of prediction */
-    size_t total; /* the file: all of these, and the container with what is about the scene */
+    size_t steps; /* doublings of each anchor, and the prediction rules */
+    size_t total; /* the file: all of these, the container, and the sections about the scene */
 } model_sizes;
 
 struct model_steps;
 
-/** Of the coded model in a file of `total` bytes. GBT_ERR_FORMAT when it is none. */
+/** The sizes in a coded model, whose file has `total` bytes. GBT_ERR_FORMAT when it is not coded. */
 gbt_status model_sizes_read(const container *c, size_t total, model_sizes *out, gbt_error *err);
 
 /**
- * Save in one of the two small forms (docs/compression.md), then as model_save(). What the file gives back is
- * compared with what it should before anything is written.
+ * Save in one of the two small forms (docs/compression.md), otherwise as model_save(). Before anything is
+ * written, the coded model is decoded and compared with the expected result.
  *
  * @param path  [in]  NULL: write nothing, only measure
- * @param steps [in]  of this model (io/model_steps.h): anchors are put in order of their positions, values
- *                    are rounded. NULL: lossless, all bits and the order are kept
+ * @param steps [in]  quantization steps for this model (io/model_steps.h): anchors are sorted by position and
+ *                    values are rounded. NULL: lossless, which also keeps the order
  * @param sizes [out] optional (NULL)
- * @return also GBT_ERR_ARGUMENT for values that no steps can hold, GBT_ERR_INTERNAL when the comparison fails
+ * @return also GBT_ERR_ARGUMENT for values that cannot be quantized, GBT_ERR_INTERNAL when the comparison
+ *         fails
  */
 gbt_status model_save_coded(const char *path, const model *m, const struct model_steps *steps,
                             model_sizes *sizes, gbt_error *err);
 
 /**
- * Load and check, whichever form it has: every byte by checksum, shapes, ranges, all values finite.
+ * Load a model in any of the three forms and check it: checksums of all bytes, shapes, ranges, all values
+ * finite.
  *
  * @param out [out] free with model_free(); zeroed on failure
  * @return GBT_OK, GBT_ERR_IO (cannot read), GBT_ERR_FORMAT (damaged, or not a model: says which section),
@@ -45,11 +47,11 @@ gbt_status model_save_coded(const char *path, const model *m, const struct model
  */
 gbt_status model_load(const char *path, model *out, gbt_error *err);
 
-/** The model's sections, for a file that holds more than a model. `m` is borrowed until the writer has
+/** Add the model's sections to a file that also holds other things. `m` is borrowed until the writer has
     saved. */
 void model_add(container_writer *w, const model *m);
 
-/** The model in a file that holds more; as model_load(). */
+/** Read the model from a file that also holds other things; otherwise as model_load(). */
 gbt_status model_from_container(const container *c, model *out, gbt_error *err);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_parts.c -- floats to numbers of steps, numbers to coders, and back. */
+/* io/model_parts.c -- quantizes a model to integers, codes them part by part, and converts back. */
 #include "io/model_parts.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 
 enum { PIXEL_NONE = INT32_MIN, PIXEL_LEAST = -126 * 8, PIXEL_MOST = 127 * 8, INDEX_MAX = 1 << 20 };
 
-/* The fields in the order of their columns. */
+/* The fields in the order of their columns in the table. */
 static const struct {
     code_part part;
     anchor_field field;
@@ -35,7 +35,7 @@ static int field_width(const model_parts *p, int coded)
     return (int)row_field_width(&anchor_fields[coded_fields[coded].field], p->offset_count);
 }
 
-/* First column of a coded field, or how many there are. */
+/* The first column of a coded field; for the index past the last field, the number of columns. */
 static int first_column(const model_parts *p, int coded)
 {
     int first = 0;
@@ -44,7 +44,7 @@ static int first_column(const model_parts *p, int coded)
     return first;
 }
 
-/* ---- room ---- */
+/* ---- allocation ---- */
 
 static gbt_status make_coarse(model_parts *p, bool has_pixel, gbt_error *err)
 {
@@ -88,7 +88,7 @@ void model_parts_free(model_parts *p)
     *p = (model_parts){0};
 }
 
-/* ---- floats to numbers ---- */
+/* ---- floats to integers ---- */
 
 typedef struct placed {
     uint64_t cell;
@@ -118,7 +118,7 @@ static gbt_status sort_anchors(model_parts *p, const model *m, double cell_wante
     return GBT_OK;
 }
 
-/* Columns [first, first + width) from rows of floats. */
+/* Quantize rows of floats into columns [first, first + width). */
 static void fill_columns(model_parts *p, const placed *order, const float *values, int first, int width,
                          const float *steps)
 {
@@ -190,7 +190,7 @@ gbt_status model_parts_fill(model_parts *p, const model *m, const model_steps *s
     return GBT_OK;
 }
 
-/* ---- numbers to coders ---- */
+/* ---- coding ---- */
 
 static gbt_status code_pixels(const model_parts *p, range_coder *c)
 {
@@ -212,7 +212,7 @@ static gbt_status code_pixels(const model_parts *p, range_coder *c)
     return GBT_OK;
 }
 
-/* Sign and exponent in a tree, the mantissa plain. */
+/* The networks as halves: sign and exponent with adaptive contexts, the mantissa as plain bits. */
 static void code_networks(const model_parts *p, range_coder *c)
 {
     coder_bit_model tree[64];
@@ -225,7 +225,7 @@ static void code_networks(const model_parts *p, range_coder *c)
 
 static gbt_status code_coarse(const model_parts *p, code_part part, range_coder *c, gbt_error *err)
 {
-    attribute_table table = p->table; /* its arrays are written through */
+    attribute_table table = p->table; /* a copy of the struct, whose arrays are shared and written */
     for (int i = 0; i < CODED_FIELDS; i++)
         if (coded_fields[i].part == part)
             return attribute_code_columns(c, &table, first_column(p, i), first_column(p, i + 1), err);
@@ -277,7 +277,7 @@ gbt_status model_parts_code(const model_parts *p, code_part part, range_coder *c
     return p->coarse ? code_coarse(p, part, c, err) : code_lossless(p, part, c, err);
 }
 
-/* ---- numbers to floats ---- */
+/* ---- integers to floats ---- */
 
 static float pixel_size(int32_t number)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_steps.c -- sensitivities to steps; features turned into their best basis. */
+/* io/model_steps.c -- measures the sensitivity of pictures to each parameter, and derives quantization steps.
+ */
 #include "io/model_steps.h"
 
 #include <math.h>
@@ -12,8 +13,9 @@
 
 enum { DIM = ANCHOR_FEATURE_DIM, GUESS_VIEWS = 16, DOUBLINGS_MAX = 2 };
 
-/* Of what Gaussians could cover this part is in front and in the picture: measured against views, on three
-   scenes (docs/compression.md). */
+/* The guess without views counts every Gaussian as visible. Only about 1 / HIDDEN of the area that Gaussians
+   could cover is in front and in a picture, as measured against real views on three scenes
+   (docs/compression.md). */
 #define HIDDEN 30.0
 
 /* ---- sums ---- */
@@ -33,7 +35,7 @@ static double sum_squares(const float *x, size_t count)
     return sum;
 }
 
-/* Floats of one anchor that learn. */
+/* The number of learned floats of one anchor. */
 static size_t channel_count(const anchors *a)
 {
     size_t count = 0;
@@ -61,7 +63,7 @@ void model_sensitivity_add(model_sensitivity *s, const anchors *a, const anchors
             }
         }
         const float *feature = gradient->feature + i * DIM, *offset = gradient->offset + i * k3;
-        for (size_t axis = 0; axis < 3; axis++) { /* the mean is position + offset exp(scale) */
+        for (size_t axis = 0; axis < 3; axis++) { /* mean = position + offset exp(scale_log) */
             double sum = 0;
             for (size_t c = axis; c < k3; c += 3)
                 sum += (double)offset[c];
@@ -100,9 +102,9 @@ void model_sensitivity_free(model_sensitivity *s)
     *s = (model_sensitivity){0};
 }
 
-/* ---- a guess without views ---- */
+/* ---- an estimate without views ---- */
 
-/* Around an anchor, as far from it as training cameras were from what they saw. */
+/* Place a camera at random around an anchor, at the distance that training cameras had from the scene. */
 static void guess_camera(const model *m, uint64_t view, float camera[3])
 {
     const decoder *d = &m->decoder;
@@ -118,8 +120,9 @@ static void guess_camera(const model *m, uint64_t view, float camera[3])
             m->anchors.position[3 * at + (size_t)k] + distance * (float)(way[k] / sqrt(length + 1e-30));
 }
 
-/* What a sign on every pixel that a Gaussian covers alone would give: its area (of the two longer axes) under
-   the root, times how far its colour, its opacity, its outline change. Returns that area times opacity. */
+/* A random gradient of one Gaussian such as random signs on all pixels that it covers, unoccluded, would
+   give. A sum over N random signs grows with sqrt(N), so the size is the square root of the area (of the two
+   longer axes), times the derivative by colour, opacity or shape. Returns area times opacity. */
 static double guess_gradient(const gaussians *g, size_t i, uint64_t view, gaussians *out)
 {
     const float x = g->scale_x[i], y = g->scale_y[i], z = g->scale_z[i];
@@ -151,7 +154,7 @@ static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sens
     const anchors *a = &m->anchors;
     float camera[3];
     guess_camera(m, view, camera);
-    /* and what is about to be drawn */
+    /* also fills g->drawn with the Gaussians */
     GBT_TRY(decode_forward(a, &m->decoder, camera, g->visible, a->count, -0.3f, &g->drawn, &g->tape, err));
     GBT_TRY(gaussians_resize(&g->gradient, g->drawn.count, err));
     gaussians_zero(&g->gradient);
@@ -209,7 +212,7 @@ static double largest_of(const float *values, size_t count)
     return largest;
 }
 
-/* Within limits; the upper one where nothing counts. */
+/* The step within its limits; the upper limit where the sensitivity is 0. */
 static double step_of(double noise, double sensitivity, double least, double most)
 {
     const double step = sensitivity > 0 ? noise / sqrt(sensitivity) : most;
@@ -232,13 +235,14 @@ static gbt_status find_doublings(const model_sensitivity *s, model_steps *out, g
     return GBT_OK;
 }
 
-/* What all steps have in common at a quality. Uniform noise of one step has the variance 1/12. */
+/* The factor that all steps have in common at a quality. Uniform noise as wide as one step has the variance
+   step^2 / 12. */
 static double noise_at(const anchors *a, double quality)
 {
     return sqrt(12 * pow(10, -quality / 10) / ((double)channel_count(a) * fmax((double)a->count, 1)));
 }
 
-/* The smallest cell of positions: the farthest anchor is 2^20 of them away. */
+/* The smallest cell that can be stored: the anchor farthest from the first one is 2^20 cells away. */
 static double least_cell(const anchors *a)
 {
     double side = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_turn.c -- the features of a model in the basis that codes best, and its networks to fit. */
+/* io/model_turn.c -- transforms the features of a model to the basis that codes best, and its networks
+   accordingly. */
 #include <math.h>
 #include <string.h>
 
@@ -12,8 +13,8 @@ enum { DIM = ANCHOR_FEATURE_DIM };
 
 typedef double square[DIM][DIM];
 
-/* Eigenvectors of a symmetric matrix as the columns of u, largest eigenvalue first. m is left with the
-   eigenvalues. */
+/* Eigenvectors of a symmetric matrix m as the columns of u, with descending eigenvalues, which are left on
+   the diagonal of m. */
 static void eigenvectors(square m, square u)
 {
     symmetric_eigen(&m[0][0], &u[0][0], DIM, 1e-14);
@@ -46,7 +47,8 @@ static void find_covariance(const anchors *a, double mean[DIM], square covarianc
                                     ((double)a->feature[i * DIM + d] - mean[d]) / n;
 }
 
-/* forth = U^T L^T, back = L^-T U, where L L^T = S / m and U diagonalises L^T C L. */
+/* T and its inverse: forth = U^T L^T, back = L^-T U, where L L^T = S / mean of S's diagonal, and U holds the
+   eigenvectors of L^T C L. */
 static void find_basis(const square sensitivity, const square covariance, square forth, square back)
 {
     square scaled, l, product, u;
@@ -56,7 +58,8 @@ static void find_basis(const square sensitivity, const square covariance, square
     for (size_t c = 0; c < DIM; c++)
         for (size_t d = 0; d < DIM; d++)
             scaled[c][d] = sensitivity[c][d] / mean;
-    symmetric_cholesky(&scaled[0][0], &l[0][0], DIM, 1e-12); /* positive definite: model_sensitivity_end() */
+    symmetric_cholesky(&scaled[0][0], &l[0][0], DIM, 1e-12); /* positive definite, thanks to
+                                                                model_sensitivity_end() */
     for (size_t i = 0; i < DIM; i++)
         for (size_t j = 0; j < DIM; j++) {
             scaled[i][j] = 0;
@@ -76,7 +79,7 @@ static void find_basis(const square sensitivity, const square covariance, square
             for (size_t k = 0; k < DIM; k++)
                 forth[i][j] += u[k][i] * l[j][k];
         }
-    for (size_t j = 0; j < DIM; j++) /* L^T x = u_j, from the last row up */
+    for (size_t j = 0; j < DIM; j++) /* solve L^T x = u_j by back substitution */
         for (size_t i = DIM; i-- > 0;) {
             double sum = u[i][j];
             for (size_t k = i + 1; k < DIM; k++)
@@ -85,7 +88,8 @@ static void find_basis(const square sensitivity, const square covariance, square
         }
 }
 
-/* Rows of W1 as they see the turned features; b1 takes what the mean did. */
+/* Replace W1 by W1 T^-1, and add W1 (mean f) to the bias b1, because the mean is subtracted from the
+   features. */
 static void turn_networks(decoder *d, const double mean[DIM], const square back)
 {
     decoder_network networks[DECODER_NETWORKS];

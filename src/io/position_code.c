@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/position_code.c -- cells of positions as an octree, level by level. */
+/* io/position_code.c -- codes the cells of positions as an octree, level by level. */
 #include "io/position_code.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@
 
 /* ---- cells ---- */
 
-/* morton_spread() back. */
+/* The inverse of morton_spread(). */
 static uint32_t gather(uint64_t x)
 {
     x &= UINT64_C(0x1249249249249249);
@@ -47,8 +47,8 @@ position_grid position_grid_over(const float *position, size_t count, double cel
         side = fmax(side, (double)high[k] - (double)grid.origin[k]);
     while (grid.levels < POSITION_LEVELS_MAX && side > cell_wanted * ldexp(1, grid.levels))
         grid.levels++;
-    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6); /* else the wanted size itself: the box is
-                                                                       not cut finer than asked for */
+    const double least =
+        side / ldexp(1, grid.levels) * (1 + 1e-6); /* max(): cells are not made smaller than wanted */
     grid.cell = (float)fmin(fmax(fmax(least, cell_wanted), 1e-37), 1e38);
     return grid;
 }
@@ -84,7 +84,7 @@ typedef struct tree_models {
     coder_bit_model by_set[TREE_NODES][4];
     coder_bit_model by_sides[SIDES][8][SET_MAX];
     coder_mixer mixer[POSITION_LEVELS_MAX][8];
-    coder_int_model extra; /* points in a cell beyond the first */
+    coder_int_model extra; /* points in a cell after the first */
 } tree_models;
 
 typedef struct node_list {
@@ -105,7 +105,8 @@ static bool holds(const node_list *nodes, uint64_t code)
     return low < nodes->count && nodes->codes[low] == code;
 }
 
-/* Bit 2 k + s: is there a node on the lower (s = 0) or upper side along axis k? */
+/* Bit 2 k + s tells whether there is a neighbour node on the lower (s = 0) or upper (s = 1) side along axis
+   k. */
 static unsigned find_sides(const node_list *nodes, int level, uint64_t code)
 {
     uint32_t cell[3];
@@ -122,7 +123,7 @@ static unsigned find_sides(const node_list *nodes, int level, uint64_t code)
     return sides;
 }
 
-/* Which of its eight children a node has. */
+/* Write or read which of its eight children a node has. */
 static unsigned code_children(range_coder *c, tree_models *m, int level, unsigned sides, unsigned children)
 {
     unsigned out = 0, path = 1, set = 0;
@@ -137,7 +138,7 @@ static unsigned code_children(range_coder *c, tree_models *m, int level, unsigne
             &m->by_sides[touching][o][near_count]};
         int bit = children >> o & 1;
         if (o == 7 && set == 0)
-            bit = 1; /* a node has a child */
+            bit = 1; /* every node has at least one child */
         else
             bit = coder_mixed(c, models, &m->mixer[level][o], bit);
         out |= (unsigned)bit << o;
@@ -147,7 +148,7 @@ static unsigned code_children(range_coder *c, tree_models *m, int level, unsigne
     return out;
 }
 
-/* The children of all nodes of one level. `codes`: the points, when writing. */
+/* Write or read the children of all nodes of one level. `codes`: the points, when writing. */
 static gbt_status code_level(range_coder *c, tree_models *m, int level, int levels, const node_list *nodes,
                              const uint64_t *codes, size_t count, node_list *next)
 {
@@ -170,7 +171,7 @@ static gbt_status code_level(range_coder *c, tree_models *m, int level, int leve
     return GBT_OK;
 }
 
-/* How many points each cell holds. */
+/* Write or read how many points each cell holds. */
 static gbt_status code_counts(range_coder *c, tree_models *m, const node_list *cells, uint64_t *codes,
                               size_t count)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/range_coder.c -- the range coder: bytes with carries, bits with adaptive probabilities, integers as
-   bits. */
+/* io/range_coder.c -- the range coder: bytes with carry propagation, bits with adaptive probabilities, and
+   integers as sequences of bits. */
 #include "io/range_coder.h"
 
 #include <string.h>
@@ -10,17 +10,17 @@
 
 enum {
     RENORM = 1 << 24,
-    P_LEAST = 64,   /* of 65536: a sure bit costs 0.0014 bits, so that a byte is never more than some thousand
-                       of them */
-    SEEN_MAX = 250, /* then the last bits count for more than the first */
-    STRETCH_MAX = 2047, /* 8.0 */
+    P_LEAST = 64,   /* of 65536: the most probable bit still costs 0.0014 bits, so one byte cannot expand to
+                       more than some thousand bits */
+    SEEN_MAX = 250, /* the adaptation rate stops falling here, so that recent bits count for more */
+    STRETCH_MAX = 2047, /* +-8.0 in 1/256 */
     LEARN_SHIFT = 14,
-    BEYOND_MAX = 8, /* 4 read ahead, 4 that the end of writing left out */
+    BEYOND_MAX = 8, /* 4 bytes are read ahead, and up to 4 zeros are omitted at the end of writing */
     BIN_SIGN = 0,
-    BIN_CLASS = 1, /* 1 .. 31: is the number in a higher class */
+    BIN_CLASS = 1, /* 1 .. 31: is the number in a higher class? */
     CLASS_MAX = 30,
     BIN_MANTISSA = BIN_CLASS + CLASS_MAX,
-    MANTISSA_CLASSES = 13, /* classes 1 to 13 have contexts for their upper bits */
+    MANTISSA_CLASSES = 13, /* classes 1 to 13 have contexts for their highest bits below the leading one */
     MANTISSA_BITS = 3
 };
 
@@ -35,8 +35,8 @@ static void put_byte(range_coder *c, uint8_t byte)
         c->bytes[c->size++] = byte;
 }
 
-/* Move the highest byte of `low` out. It waits while a carry could still reach it: through bytes of 255
-   behind it. */
+/* Output the highest byte of `low`. It is held back as long as a later carry could still change it, that is
+   while only bytes of 255 follow it. */
 static void shift_low(range_coder *c)
 {
     if (c->low < UINT64_C(0xFF000000) || c->low > UINT64_C(0xFFFFFFFF)) {
@@ -59,7 +59,7 @@ static uint8_t next_byte(range_coder *c)
 
 /* ---- probabilities ---- */
 
-/* 65536 / (1 + e^-x), x in 1/256, from its values at steps of 1/2. */
+/* The logistic function 65536 / (1 + e^-x), x in 1/256, interpolated from a table with steps of 1/2. */
 static int squash(int x)
 {
     static const int32_t at[33] = {22,    36,    60,    98,    162,   267,   439,   720,   1179,
@@ -71,7 +71,7 @@ static int squash(int x)
     return (int)((at[i] * (128 - f) + at[i + 1] * f) >> 7);
 }
 
-/* The inverse of squash(), by walking along it. */
+/* Tabulate the inverse of squash(), by walking along squash(). */
 static void fill_stretch(int16_t stretch[CODER_STRETCH_SIZE])
 {
     int next = 0;
@@ -87,7 +87,7 @@ static uint32_t cut(int p)
     return (uint32_t)(p < P_LEAST ? P_LEAST : p > 65536 - P_LEAST ? 65536 - P_LEAST : p);
 }
 
-/* The mean of the bits seen, at first; a sliding one later. */
+/* Move p towards the bit: at first p is the mean of all bits seen, later an exponentially weighted mean. */
 static void learn(coder_bit_model *m, int bit)
 {
     const int step = ((bit << 16) - (int)m->p - bit) * 2 / (2 * m->seen + 3);
@@ -130,7 +130,7 @@ void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size)
     c->reading = true;
     c->range = UINT32_MAX;
     c->bytes = (unsigned char *)(uintptr_t)bytes;
-    c->size = size; /* only read */
+    c->size = size; /* `bytes` is only read from here on */
     fill_stretch(c->stretch);
     for (int i = 0; i < 4; i++)
         c->code = c->code << 8 | next_byte(c);
@@ -138,13 +138,13 @@ void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size)
 
 gbt_status coder_write_end(range_coder *c, gbt_error *err)
 {
-    c->low = (c->low + RENORM - 1) &
-             ~(uint64_t)(RENORM - 1); /* in [low, low + range), and ends in three bytes of zero */
+    c->low = (c->low + RENORM - 1) & ~(uint64_t)(RENORM - 1); /* rounded up within [low, low + range) so that
+                                                                 it ends in three zero bytes */
     for (int i = 0; i < 5; i++)
         shift_low(c);
     if (c->status != GBT_OK)
         return base_fail(err, c->status, "out of memory for coded bytes");
-    c->size--; /* the first byte written is what `held` started with: 0, for a carry never reaches it */
+    c->size--; /* drop the first byte, the initial `held`, which is always 0 because no carry reaches it */
     memmove(c->bytes, c->bytes + 1, c->size);
     for (int i = 0; i < 4 && c->size > 0 && c->bytes[c->size - 1] == 0; i++)
         c->size--;
@@ -191,7 +191,8 @@ int coder_adaptive(range_coder *c, coder_bit_model *m, int bit)
     return bit;
 }
 
-/* The logarithms of the odds, weighted; the weights follow the gradient of the cost. */
+/* Mix the contexts' probabilities in the logistic domain, and update the weights by the gradient of the
+   coding cost (Mahoney 2005). */
 int coder_mixed(range_coder *c, coder_bit_model *const models[CODER_INPUTS], coder_mixer *mixer, int bit)
 {
     int st[CODER_INPUTS];

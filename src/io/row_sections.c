@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/row_sections.c -- one section for each field. */
+/* io/row_sections.c -- stores arrays with a row per anchor as one section per field. */
 #include "io/row_sections.h"
 
 #include <stdio.h>

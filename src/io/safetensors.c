@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/safetensors.c -- the header of a .safetensors file, and the array it points to. */
+/* io/safetensors.c -- reads the header of a .safetensors file, and the array it points to. */
 #include "io/safetensors.h"
 
 #include <jansson.h>
@@ -34,7 +34,8 @@ static bool get_size(const json_t *list, size_t i, size_t *out)
     return true;
 }
 
-/* False unless there are one to four sizes, and none of the two that they become is beyond `room`. */
+/* Reduce a shape of one to four dimensions to rows and columns; false if there are more or fewer, or if the
+   result exceeds `room`. */
 static bool read_shape(const json_t *shape, size_t room, tensor *out)
 {
     const size_t dimensions = json_array_size(shape);
@@ -48,7 +49,7 @@ static bool read_shape(const json_t *shape, size_t room, tensor *out)
     return dimensions >= 1 && dimensions <= 4;
 }
 
-/* Shape and place of an array; GBT_ERR_FORMAT unless both are right. */
+/* Read the shape and position of an array; GBT_ERR_FORMAT unless both are valid. */
 static gbt_status read_entry(const source_file *file, const json_t *entry, const char *name, size_t data_at,
                              tensor *out, size_t *at, gbt_error *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/scaffold_file.c -- Scaffold-GS's arrays put where ours are. */
+/* io/scaffold_file.c -- converts the anchors and networks of Scaffold-GS to ours. */
 #include "io/scaffold_file.h"
 
 #include <math.h>
@@ -27,7 +27,8 @@ typedef struct anchor_rows {
     size_t column_count, dropped;
 } anchor_rows;
 
-/* Columns come as position, features, log-scales, offsets; of the offsets all x, then all y, then all z. */
+/* The columns are position, features, log-scales and offsets; of the offsets all x, then all y, then all z.
+ */
 static void add_row(void *context, const double *values)
 {
     anchor_rows *rows = context;
@@ -49,7 +50,7 @@ static void add_row(void *context, const double *values)
             a->offset[(row * k + i) * DIMENSIONS + c] = (float)*values++;
 }
 
-/* Adds the columns STEM0, STEM1, ... up to `count`, or as many as there are when `count` is 0. */
+/* Find the columns STEM0, STEM1, ... up to `count`, or as many as there are when `count` is 0. */
 static gbt_status find_columns(const source_file *file, const ply_header *header, int vertex,
                                const char *stem, size_t count, int *columns, size_t *used, gbt_error *err)
 {
@@ -94,12 +95,12 @@ static gbt_status read_anchors(const source_file *file, anchors *out, size_t *dr
                          offsets, (int)ANCHOR_MAX_OFFSETS);
     out->offset_count = (int)(offsets / DIMENSIONS);
     const uint64_t count = header.elements[vertex].count;
-    if (count > (file->size - header.data_at) / used) /* a column takes at least a byte */
+    if (count > (file->size - header.data_at) / used) /* every column takes at least one byte */
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu anchors cannot be in the %zu bytes that follow",
                          file->name, header.data_at, (unsigned long long)count, file->size - header.data_at);
     GBT_TRY(anchors_resize(out, (size_t)count, err));
     anchor_rows rows = {.out = out, .column_count = used};
-    out->count = 0; /* of rows that are usable */
+    out->count = 0; /* counts the usable rows from here on */
     GBT_TRY(ply_read_rows(file, &header, vertex, columns, used, add_row, &rows, err));
     *dropped = rows.dropped;
     return out->count > 0 ? GBT_OK
@@ -107,7 +108,7 @@ static gbt_status read_anchors(const source_file *file, anchors *out, size_t *dr
                                       file->name, rows.dropped);
 }
 
-/* Positions relative to their median, so that floats keep what they have. */
+/* Subtract the median of the positions, to keep their precision in float. */
 static gbt_status recentre(anchors *a, double origin[DIMENSIONS], gbt_error *err)
 {
     float *axis = mem_alloc(a->count, sizeof *axis, "anchors", err);
@@ -127,7 +128,7 @@ static gbt_status recentre(anchors *a, double origin[DIMENSIONS], gbt_error *err
 
 /* ---- networks ---- */
 
-/* Two layers, as the file has them. */
+/* The two layers of a network, as in the file. */
 typedef struct network {
     tensor w1, b1, w2, b2;
 } network;
@@ -170,8 +171,8 @@ static gbt_status parse_network(const source_file *file, size_t outputs, network
 
 #define BY_PYTHON "python3 -c \"import torch; from safetensors.torch import save_file; "
 
-/* For the shell, in the folder of the files. `checkpoint`: a file of all networks; NULL: each is in a file of
-   its own. */
+/* The Python command that converts the networks, to be run in the folder of the files. `checkpoint`: a file
+   with all networks; NULL: each network has its own file. */
 static void conversion(const char *checkpoint, char *out, size_t size)
 {
     if (checkpoint == NULL)
@@ -223,7 +224,7 @@ static gbt_status load_network(const char *folder, const char *name, size_t outp
     return status;
 }
 
-/* A network without the distance among its inputs does not look at it: weight 0. */
+/* A network that does not take the distance gets weight 0 for that input. */
 static void copy_network(const network *from, size_t in, float *to)
 {
     for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++)
@@ -260,7 +261,7 @@ static gbt_status read_decoder(const char *folder, int offset_count, decoder *ou
     if (status == GBT_OK) {
         decoder_network ours[NETWORKS];
         decoder_networks(out, ours);
-        out->distance_scale = 1; /* scene units, as they are */
+        out->distance_scale = 1; /* distances are in scene units */
         for (int i = 0; i < NETWORKS; i++)
             copy_network(&networks[i], VIEW_INPUTS + (has_distance ? 1 : 0), out->params + ours[i].begin);
     }

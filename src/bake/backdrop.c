@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bake/backdrop.c -- a sphere of Gaussians of the background's colour around everything. */
+/* bake/backdrop.c -- represents the background by a sphere of Gaussians around everything. */
 #include "bake/backdrop.h"
 
 #include <math.h>
@@ -8,8 +8,8 @@
 #include "base/fail.h"
 #include "base/vec.h"
 
-/* On a sphere of radius 1 the Gaussians are sqrt(4 pi / BACKDROP_COUNT) = 0.112 apart. At this standard
-   deviation they overlap so far that nothing shines through between them. */
+/* On the unit sphere the Gaussians are sqrt(4 pi / BACKDROP_COUNT) = 0.112 apart. With this standard
+   deviation they overlap enough that nothing shines through between them. */
 static const double deviation = 0.135;
 static const float opacity = 0.99f;
 

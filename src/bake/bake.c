@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bake/bake.c -- means over the cameras that see a Gaussian.
+/* bake/bake.c -- converts neural Gaussians to plain ones by averaging over the cameras that see them.
 
    cameras --> decode, trace, weights --> sums per Gaussian --+
    64 directions --> decode --> sums of colours --------------+--> opacity, shape, spherical harmonics */
@@ -19,23 +19,25 @@
 enum { TERMS = GAUSSIAN_SH_COUNT, PAIRS = TERMS * (TERMS + 1) / 2, DIRECTIONS = 64, PIXEL_STEP = 2 };
 
 static const float opacity_min = 1.0f / 255;
-static const double ridge = 1e-4; /* of the mean of the diagonal: keeps directions from one side solvable */
+static const double ridge = 1e-4; /* relative to the mean of the diagonal; keeps the fit solvable if all
+                                     directions are from one side */
 
-/* What is known of one Gaussian so far. */
+/* The sums for one Gaussian. w is its blend weight in a view; y are the spherical harmonics of the view
+   direction, c is its colour. */
 typedef struct sums {
-    double weight;          /* of the views in which it was made: w */
+    double weight;          /* w, summed over the views in which the decoder made it */
     double opaque;          /* w / opacity */
     double covariance[6];   /* w (xx xy xz yy yz zz) */
     double normal[PAIRS];   /* w y_k y_l, l <= k */
     double color[TERMS][3]; /* w y_k (c - 0.5) */
     float mean[3];
-    uint32_t kept; /* views in which it was made */
+    uint32_t kept; /* number of views in which the decoder made it (opacity above 0) */
 } sums;
 
 typedef struct baking {
     const anchors *a;
     int functions;
-    sums *sums;        /* [anchor][offset] */
+    sums *sums;        /* [anchor] number of views in which the anchor was decoded */
     uint32_t *visible; /* [anchor] views in which it was decoded */
 } baking;
 
@@ -76,7 +78,7 @@ static void direction_to(const double eye[3], const float mean[3], float out[3])
         out[k] = (float)d[k];
 }
 
-/* One camera: what it makes of each Gaussian, and how much of that it sees. */
+/* Add one camera: how each Gaussian is decoded for it, and with what weight it is blended in the picture. */
 static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_camera *camera,
                            const trace_settings *settings, gbt_error *err)
 {
@@ -108,8 +110,8 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     return GBT_OK;
 }
 
-/* What the networks are told of a distance in the middle of those trained; where the model does not say which
-   those were, the mean from a camera to an anchor. */
+/* The distance input of the networks in the middle of the trained range; if the model does not record the
+   range, the mean distance from cameras to anchors. */
 static float middle_distance(const anchors *a, const decoder *d, const gbt_camera *cameras, size_t count)
 {
     if (isfinite(d->distance_max))
@@ -125,13 +127,14 @@ static float middle_distance(const anchors *a, const decoder *d, const gbt_camer
     return (float)(sum / (double)(count * a->count)) * d->distance_scale;
 }
 
-/* All Gaussians from so far away that one direction leads to all; the networks are told another distance. */
+/* Add the colours of all Gaussians seen along DIRECTIONS directions: decoded from so far away that the
+   direction is the same for all, with the distance input clamped to `middle`. */
 static gbt_status add_directions(baking *b, frame *f, const decoder *trained, float middle, double prior,
                                  gbt_error *err)
 {
     decoder d = *trained;
     d.distance_min = 2 * middle;
-    d.distance_max = 0.5f * middle; /* distances are cut to [min / 2, 2 max] */
+    d.distance_max = 0.5f * middle; /* the decoder clamps distances to [min / 2, 2 max], here to `middle` */
     float size = 1;
     for (size_t i = 0; i < 3 * b->a->count; i++)
         size = fmaxf(size, fabsf(b->a->position[i]));
@@ -149,7 +152,7 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, fl
                               -1e4f * size * direction[2]};
         status = decode_forward(b->a, &d, far, all, b->a->count, 0, &f->gaussians, &f->tape, err);
         for (size_t i = 0; i < f->gaussians.count && status == GBT_OK; i++) {
-            sums *s = &b->sums[f->tape.slot[i]]; /* every anchor is in its own row */
+            sums *s = &b->sums[f->tape.slot[i]]; /* all anchors are decoded: rows are their indices */
             if (s->weight > 0)
                 add_color(b, s, direction,
                           (const float[3]){f->gaussians.red[i], f->gaussians.green[i], f->gaussians.blue[i]},
@@ -160,7 +163,7 @@ static gbt_status add_directions(baking *b, frame *f, const decoder *trained, fl
     return status;
 }
 
-/* Least squares by Cholesky's factor. */
+/* Weighted least squares by Cholesky factorization. */
 static void solve_color(const baking *b, const sums *s, float *sh)
 {
     const int n = b->functions;
@@ -184,7 +187,7 @@ static void solve_color(const baking *b, const sums *s, float *sh)
     }
 }
 
-/* Standard deviations along the axes of a covariance, and the rotation to them. */
+/* The standard deviations along the principal axes of the covariance, and the rotation to these axes. */
 static void solve_shape(const sums *s, float scale_log[3], float quat[4])
 {
     const double *c = s->covariance;
@@ -202,8 +205,8 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
         quat[k] = (float)q[k];
 }
 
-/* Over the views in which the anchor was decoded: where the Gaussian was not made its opacity was 0, and it
-   would have been as large as elsewhere. */
+/* The mean opacity over the views in which the anchor was decoded. In views where this Gaussian was not made,
+   its opacity counts as 0 and its weight, had it been opaque, as the mean of the other views. */
 static float opacity_of(const sums *s, uint32_t visible)
 {
     const double missed = visible > s->kept && s->kept > 0 ? (double)(visible - s->kept) / s->kept : 0;
@@ -229,7 +232,8 @@ static int by_slot(const void *a, const void *b)
     return (x->slot > y->slot) - (x->slot < y->slot);
 }
 
-/* Those that are seen, at most `count_max` (0: all) of the largest weights, in the order of slots. */
+/* Choose the Gaussians that some camera sees; of these at most `count_max` (0: all) with the largest weights.
+   Ordered by slot. */
 static size_t choose(const baking *b, size_t count_max, ranked *list, bake_result *out)
 {
     const size_t k_count = (size_t)b->a->offset_count, slots = b->a->count * k_count;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bake/export.c -- bake a run or read plain Gaussians, write them, and say what was lost. */
+/* bake/export.c -- exports a run, or converts plain Gaussians: bakes or reads, writes the files, reads them
+   back, and reports the loss in dB. */
 #include "gbtrace/export.h"
 
 #include <math.h>
@@ -25,51 +26,51 @@
 
 enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
 
-static const double near_loss_db = 0.5; /* from here on a warning */
+static const double near_loss_db = 0.5; /* a larger loss gives a warning */
 
 gbt_export_def gbt_export_def_default(void)
 {
     return (gbt_export_def){.sh_degree = 3, .refine_steps = 500, .backdrop = true, .cookie_ = DEF_COOKIE};
 }
 
-/* One output, and what it gives back: PSNR in dB of 8-bit images, means over views. */
+/* One output, and how well it reproduces the model: PSNR in dB of 8-bit images, means over views. */
 typedef struct exported {
     const char *path;
-    gaussian_cloud back;         /* of a file that we read */
-    const gaussian_cloud *shown; /* in the model's coordinates: `back`, or what was written, where floats stay
-                                    floats */
+    gaussian_cloud back;         /* the file read back, if we can read its format */
+    const gaussian_cloud *shown; /* in the model's coordinates: `back`, or `baked` for formats that store
+                                    floats unchanged */
     const gaussian_cloud *baked; /* what was written */
-    float near;                  /* that its readers draw it with */
-    double to_bake;              /* of a file that we read */
+    float near;                  /* near distance with which readers of the file draw it */
+    double to_bake;              /* PSNR between `back` and `baked` */
     double to_model, to_photo;
-    double with_near; /* to_model, if the file kept the near distance */
+    double with_near; /* to_model, had the file stored the near distance */
     long long bytes;
 } exported;
 
 typedef struct exporting {
     const gbt_export_def *def;
-    loaded_run run; /* with `baked` */
+    loaded_run run; /* valid if `baked` */
     bool baked, backdrop;
-    trace_settings viewer;    /* how files are drawn: as other programs do, on black */
-    gaussian_cloud clouds[2]; /* with colours of the degree asked for, and with one colour */
+    trace_settings viewer;    /* how other programs draw files: on black */
+    gaussian_cloud clouds[2]; /* with the requested SH degree, and with degree 0 */
     exported files[OUTPUTS_MAX];
     size_t file_count;
     size_t unseen, thinned;
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
-    size_t view_count, *views; /* that are compared */
-    size_t photo_count;        /* of these, with photos that say something */
+    size_t view_count, *views; /* views to compare */
+    size_t photo_count;        /* number of these that have a photo with valid pixels */
     bool held_out;
-    frame frame, bake;    /* of what a file gives back, and of what was written */
+    frame frame, bake;    /* render `shown` and `baked` of an output */
     const char *folder;   /* the output that is a result folder, or NULL */
-    image_scores *scores; /* [view_count], of what it gives back */
+    image_scores *scores; /* [view_count], for the result folder */
     lpips *net;           /* for the folder, or NULL */
-    lpips_scores *lpips;  /* [view_count], with it */
+    lpips_scores *lpips;  /* [view_count], likewise */
 } exporting;
 
 /* ---- from a run to Gaussians ---- */
 
-/* Held-out views, at most VIEWS_MAX evenly chosen, but all for a result folder; training views when there are
-   none. */
+/* Choose held-out views to compare: at most VIEWS_MAX, evenly spaced; all for a result folder. Training views
+   when there are no held-out ones. */
 static gbt_status choose_views(exporting *e, gbt_error *err)
 {
     const scene *s = &e->run.scene;
@@ -90,7 +91,7 @@ static gbt_status choose_views(exporting *e, gbt_error *err)
     return GBT_OK;
 }
 
-/* Cameras of the training photos, and how each is drawn. Both are to be freed, also after a failure. */
+/* The cameras of the training photos, and how each is drawn. The caller frees both, also after a failure. */
 static gbt_status training_cameras(const loaded_run *r, gbt_camera **cameras, trace_settings **settings,
                                    size_t *count, gbt_error *err)
 {
@@ -114,7 +115,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(choose_views(e, err));
     memcpy(e->origin, r->model.origin, sizeof e->origin);
     e->frame.draw.footprint = e->bake.draw.footprint = r->frame.draw.footprint;
-    /* Behind photos with an alpha channel is nothing, and what they are laid on is no part of the scene. */
+    /* The colour behind photos with an alpha channel is not part of the scene: it gets no backdrop. */
     e->viewer = r->settings;
     float laid_on[3];
     if (scene_background(&r->scene, laid_on))
@@ -131,7 +132,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     return GBT_OK;
 }
 
-/* From the networks. */
+/* Bake the neural Gaussians of the run. */
 static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt_error *err)
 {
     loaded_run *r = &e->run;
@@ -168,9 +169,9 @@ static gbt_status bake_run(exporting *e, int sh_degree, gaussian_cloud *out, gbt
     return status;
 }
 
-/* ---- what is lost ---- */
+/* ---- measuring the loss ---- */
 
-/* As other programs draw the view at `index`, with a near distance. */
+/* How other programs draw the view at `index`, with a given near distance. */
 static trace_settings viewer_at(const exporting *e, size_t index, float near)
 {
     trace_settings s = e->viewer;
@@ -178,18 +179,18 @@ static trace_settings viewer_at(const exporting *e, size_t index, float near)
     return s;
 }
 
-/* One view of the model and of every file. */
+/* Compare one view of the model with that view of every output. */
 static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *camera, image *photo,
                                const unsigned char *valid, gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
     image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
-    const gaussian_cloud *drawn = NULL; /* by `bake` */
+    const gaussian_cloud *drawn = NULL; /* the cloud that `bake` shows */
     const trace_settings viewer = viewer_at(e, index, e->run.settings.t_near);
     image_quantize(photo);
     image_quantize(neural);
     const double of_model = metric_psnr_valid(neural, photo, valid);
-    const bool scored = !isnan(of_model); /* not where a mask covers the whole photo */
+    const bool scored = !isnan(of_model); /* false where a mask excludes the whole photo */
     e->photo_count += scored;
     e->model_to_photo += scored ? of_model : 0;
     for (size_t i = 0; i < e->file_count; i++) {
@@ -203,7 +204,8 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         }
         f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
         f->with_near += share * metric_psnr(shown, neural);
-        if (f->near != e->run.settings.t_near) { /* what it does not keep its readers do not know */
+        if (f->near != e->run.settings.t_near) { /* readers draw the file without the near distance if it
+                                                    cannot store it */
             const trace_settings own = viewer_at(e, index, f->near);
             GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &own, false, err));
             image_quantize(shown);
@@ -220,7 +222,7 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
     return GBT_OK;
 }
 
-/* Views outside, files inside: the model is drawn once. */
+/* The outer loop is over views, so the model is rendered only once per view. */
 static gbt_status compare(exporting *e, gbt_error *err)
 {
     for (size_t i = 0; i < e->view_count; i++) {
@@ -243,7 +245,8 @@ static gbt_status compare(exporting *e, gbt_error *err)
 
 /* ---- entry ---- */
 
-/* A file can be written where it goes; one in the result folder, which is made first, where that can. */
+/* Check that a file can be written at `path`. A file in the result folder is not checked, because that folder
+   is created first and checked itself. */
 static gbt_status check_place(const char *path, const char *folder, gbt_error *err)
 {
     const size_t length = folder != NULL ? strlen(folder) : 0;
@@ -278,7 +281,7 @@ static gbt_status check_places(const char *input, const char *json, const char *
     return check_place(json, folder, err);
 }
 
-/* What plain Gaussians have no use for: they are only converted. */
+/* Reject options that have no meaning for plain Gaussians, which are only converted. */
 static gbt_status check_plain(const char *input, const gbt_export_def *def, gbt_error *err)
 {
     static const char wanted[] = "wanted a trained model";
@@ -334,7 +337,7 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
     fprintf(report, "\n");
 }
 
-/* Write an output, and read back what it gives. */
+/* Write an output, and read it back. */
 static gbt_status write_one(exporting *e, exported *f, const gaussian_cloud *cloud, gbt_error *err)
 {
     const char *path = f->path;
@@ -391,8 +394,8 @@ static void say_file(const exporting *e, const exported *f, FILE *report)
     fprintf(report, "\n");
 }
 
-/* All files whose format keeps colours of this degree, or only `flat` ones. Where a format keeps one colour,
-   that colour is fitted: the first term of a longer series is not the best constant. */
+/* Write all outputs whose format stores this SH degree, or with `flat` those of degree 0. For these the
+   colours are fitted separately, because degree 0 of a longer fit is not the best constant. */
 static gbt_status write_kind(exporting *e, const char *input, bool flat, const char *const *outputs,
                              size_t output_count, FILE *report, gbt_error *err)
 {

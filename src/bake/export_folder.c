@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bake/export_folder.c -- the files of a 3DGS result folder, as its tools read them. */
+/* bake/export_folder.c -- writes a 3DGS result folder in the form that tools for 3DGS read. */
 #include "bake/export_folder.h"
 
 #include <math.h>
@@ -25,10 +25,10 @@ bool export_folder_is(const char *path)
     return length > 0 && path[length - 1] == '/';
 }
 
-/* ---- what the run was ---- */
+/* ---- the settings of the run ---- */
 
-/* The text of Python's Namespace(...), which the tools evaluate: a quote or a backslash in a path is not for
-   them. */
+/* A path for cfg_args. Tools evaluate its Namespace(...) as Python, so quotes, backslashes and control
+   characters are replaced. */
 static void put_path(const char *path, char *out, size_t size)
 {
     char full[PATH_SIZE];
@@ -39,7 +39,8 @@ static void put_path(const char *path, char *out, size_t size)
     out[used] = '\0';
 }
 
-/* By what photos are divided, or the width of the pictures; -1, which leaves it open, where they differ. */
+/* 3DGS's `resolution`: the factor by which photos are divided, or the width of the pictures; -1 (not
+   specified) if widths differ. */
 static int resolution_of(const loaded_run *r)
 {
     if (result_resolution_divides(r->def.downscale))
@@ -56,7 +57,7 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
     char path[PATH_SIZE], source[PATH_SIZE], result[PATH_SIZE], text[3 * PATH_SIZE];
     float laid_on[3] = {0};
     const bool white = scene_background(&r->scene, laid_on) &&
-                       laid_on[0] > 0; /* any other background is in the file, or black */
+                       laid_on[0] > 0; /* any other background is stored as Gaussians, or is black */
     put_path(r->scene.folder, source, sizeof source);
     put_path(folder, result, sizeof result);
     bool holds_out = false;
@@ -71,7 +72,7 @@ static gbt_status write_settings(const char *folder, const loaded_run *r, int sh
     return file_write_atomic(path, text, strlen(text), err);
 }
 
-/* Position and rotation camera to world, of the pinhole that best stands for a lens. */
+/* Position and camera-to-world rotation of the pinhole camera that best approximates the lens. */
 static json_t *camera_to_json(const loaded_run *r, size_t view, size_t id)
 {
     const gbt_camera c = photos_camera(&r->photos, view, 0);
@@ -134,7 +135,8 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     GBT_TRY(file_join(place, sizeof place, folder, name, err));
     GBT_TRY(file_make_folder(place, err));
     GBT_TRY(file_join(path, sizeof path, place, "point_cloud.ply", err));
-    gaussian_cloud plain = *cloud; /* its viewer wants the count in the third line: no mark before it */
+    gaussian_cloud plain =
+        *cloud; /* without the mip comment, because the 3DGS viewer expects the count in the third line */
     plain.antialiased = false;
     GBT_TRY(gaussian_file_write(path, &plain, r->model.origin, err));
     struct stat info = {0};
@@ -165,7 +167,7 @@ gbt_status export_folder_write(const char *folder, const loaded_run *r, const ga
     return write_settings(folder, r, cloud->sh_degree, err);
 }
 
-/* ---- how it looks ---- */
+/* ---- pictures and scores ---- */
 
 static gbt_status write_picture(const char *folder, const loaded_run *r, const char *kind, size_t index,
                                 const image *picture, gbt_error *err)
@@ -186,7 +188,7 @@ gbt_status export_folder_picture(const char *folder, const loaded_run *r, size_t
     return write_picture(folder, r, "gt", index, photo, err);
 }
 
-/* One measure over the pictures; what is not a number is null, and not in the mean. */
+/* One measure over the pictures; values that are not finite become null and do not count in the mean. */
 typedef struct score_list {
     const char *name;
     json_t *values;

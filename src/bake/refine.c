@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* bake/refine.c -- one step: both pictures, the loss between them, back, Adam. */
+/* bake/refine.c -- fits plain Gaussians to the model's pictures: render both, loss, adjoint, Adam. */
 #include "bake/refine.h"
 
 #include <math.h>
@@ -15,14 +15,14 @@
 
 enum { BLOCK = 512, PIXEL_STEP = 2, STREAM = 1, REST = 3 * (GAUSSIAN_SH_COUNT - 1) };
 
-static const double rate_end = 0.1; /* rates fall to this share */
+static const double rate_end = 0.1; /* learning rates decay to this fraction */
 static const struct {
     double opacity, scale, rotation, color, harmonics;
 } first_rates = {0.04, 0.006, 0.002, 0.005, 0.0025};
 
 typedef struct refining {
     gaussian_cloud *cloud, gradient, moment1, moment2;
-    float *logit; /* [count] of the opacities: what is stepped */
+    float *logit; /* [count] logits of the opacities, which are optimized */
     frame frame;
     image d_image;
     loss_scratch scratch;
@@ -72,7 +72,7 @@ static void step_block(size_t block, size_t begin, size_t end, void *context)
     gaussian_cloud *p = r->cloud, *g = &r->gradient, *m = &r->moment1, *v = &r->moment2;
     const size_t n = end - begin, sh_width = GAUSSIAN_SH_COUNT * 3;
     for (size_t i = begin; i < end; i++)
-        g->opacity[i] *= p->opacity[i] * (1 - p->opacity[i]); /* of the logit */
+        g->opacity[i] *= p->opacity[i] * (1 - p->opacity[i]); /* chain rule: from opacity to its logit */
     adam_step(r->logit + begin, g->opacity + begin, m->opacity + begin, v->opacity + begin, n, r->opacity);
     adam_step(p->scale_log + 3 * begin, g->scale_log + 3 * begin, m->scale_log + 3 * begin,
               v->scale_log + 3 * begin, 3 * n, r->scale);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/cluster.c -- finds the module of the MPI that started this process, and counts what goes through
- * it. */
+/* cluster/cluster.c -- loads the module for the MPI that started this process, and exchanges data through
+   it. */
 #include "cluster/cluster.h"
 
 #include <dlfcn.h>
@@ -21,8 +21,8 @@ enum { PATH_SIZE = 4096, WORD = 4 };
 static const cluster_module *module;
 static int own_rank, own_size = 1;
 static bool apart;                 /* cluster_apart() */
-static gbt_status agreed = GBT_OK; /* the last failure that all know of */
-static int own_stderr = -1;        /* of a process that is silent */
+static gbt_status agreed = GBT_OK; /* the last failure that all processes know of */
+static int own_stderr = -1;        /* the original stderr of a process whose output is discarded; else -1 */
 static cluster_traffic traffic;
 
 static bool is_alone(void) { return module == NULL || apart; }
@@ -34,7 +34,7 @@ cluster_traffic cluster_traffic_so_far(void) { return traffic; }
 
 /* ---- the module ---- */
 
-/* What an mpirun, or Slurm, leaves in the environment of what it starts. */
+/* The environment variables by which mpirun and Slurm tell the processes their number and rank. */
 static const struct {
     const char *size, *rank, *module, *name;
 } starters[] = {
@@ -43,7 +43,9 @@ static const struct {
     {"SLURM_STEP_NUM_TASKS", "PMIX_RANK", "gbtrace_openmpi.so", "Open MPI"}, /* srun, by PMIx */
 };
 
-/* Beside the program or the library that this is part of, as built; or in the folder that it is installed to.
+/*
+ * Find the module beside the program or library that contains this code, as in a build tree, or in the
+ * installed folder.
  */
 static bool find_module(const char *name, char out[PATH_SIZE])
 {
@@ -51,7 +53,7 @@ static bool find_module(const char *name, char out[PATH_SIZE])
     Dl_info here;
     char own[PATH_SIZE];
     const bool found = dladdr((const void *)&own_size, &here) != 0;
-    /* A program that was found by PATH has a name without a place. */
+    /* dladdr() gives a bare name for a program that was found through PATH. */
     const char *file = found && strchr(here.dli_fname, '/') != NULL ? here.dli_fname : "/proc/self/exe";
     if (realpath(file, own) == NULL)
         return false;
@@ -71,7 +73,7 @@ static gbt_status load_module(const char *file, const char *name, const char *va
             "started by mpirun of %s (%s is %s), but %s is not installed: build gbtrace where %s is "
             "(docs/cluster.md)",
             name, variable, getenv(variable), file, name);
-    /* Global: parts that MPI itself loads look for its functions there. */
+    /* RTLD_GLOBAL, because plugins that MPI loads look up MPI's symbols. */
     void *library = dlopen(path, RTLD_NOW | RTLD_GLOBAL);
     module = library == NULL ? NULL : dlsym(library, CLUSTER_MODULE_SYMBOL);
     if (module == NULL)
@@ -82,7 +84,7 @@ static gbt_status load_module(const char *file, const char *name, const char *va
     return base_fail(err, GBT_ERR_IO, "%s: is of another version of gbtrace", path);
 }
 
-/* All but the first: nothing is told twice. */
+/* Discard the output of all processes but the first, so that nothing is printed twice. */
 static void be_silent(void)
 {
     fflush(NULL);
@@ -115,7 +117,7 @@ void gbt_cluster_close(int exit_code, const char *error)
 {
     if (module == NULL)
         return;
-    enum { USAGE = 2 }; /* all have the same command line */
+    enum { USAGE = 2 }; /* all have the same command line, so all fail alike */
     if (exit_code == 0 || exit_code == USAGE || agreed != GBT_OK) {
         module->close();
         module = NULL;
@@ -128,9 +130,10 @@ void gbt_cluster_close(int exit_code, const char *error)
     module->abort(exit_code);
 }
 
-/* ---- what they tell each other ---- */
+/* ---- communication ---- */
 
-/* MPI counts in int: 8 GB. */
+/* Convert counts and offsets to int, which MPI uses: at most 8 GB in 32-bit words. Larger messages end the
+   run. */
 static void places_of(const size_t *counts, int out_counts[CLUSTER_SIZE_MAX], int places[CLUSTER_SIZE_MAX])
 {
     size_t sum = 0;
@@ -200,7 +203,7 @@ void cluster_broadcast(void *data, size_t bytes)
 
 /* ---- failures ---- */
 
-/* What is told of one; whole words. */
+/* A failure as a message; its size is a whole number of words. */
 typedef struct told {
     int32_t status;
     char text[sizeof((gbt_error){0}.text)];

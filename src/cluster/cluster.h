@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/cluster.h -- what the processes of a run tell each other (gbtrace/cluster.h has how they meet).
+/* cluster/cluster.h -- communication between the processes of a run (gbtrace/cluster.h: how they join).
 
-   Every call is made by all processes, in the same order, on one thread; a process that is alone is told what
-   it has said. Whatever goes wrong on the way ends all processes: MPI's own rule. */
+   These are collective calls: all processes make them in the same order, on one thread. In a process that is
+   alone they return its own data. Any communication failure ends all processes, which is MPI's default. */
 #ifndef GBT_CLUSTER_CLUSTER_H
 #define GBT_CLUSTER_CLUSTER_H
 
@@ -16,30 +16,34 @@ enum { CLUSTER_SIZE_MAX = 4096 };
 
 static inline bool cluster_leads(void) { return gbt_cluster_rank() == 0; }
 
-/** Everybody gets what everybody has, in the order of the processes.
-    @param mine  [in] [counts[rank]]
-    @param counts [in] [size] of 32-bit words; the same for all
-    @param all   [out] their sum */
+/**
+ * Every process gets the data of all processes, in order of rank (MPI_Allgatherv).
+ *
+ * @param mine   [in]  [counts[rank]]
+ * @param counts [in]  [size] number of 32-bit words of each process; the same on all
+ * @param all    [out] the data of all processes, one after the other
+ */
 void cluster_gather(const void *mine, const size_t *counts, void *all);
 
-/** A part for each process, and from each a part. `send_counts` and `counts`: [size] 32-bit words that go to,
-   and come from, each; parts lie one after the other. */
+/** Every process sends a part to each process, and receives a part from each (MPI_Alltoallv). `send_counts`
+    and `counts`: [size] number of 32-bit words sent to and received from each; the parts follow each other.
+    */
 void cluster_exchange(const void *send, const size_t *send_counts, void *all, const size_t *counts);
 
-/** What the first process has becomes everybody's. */
+/** Every process gets the data of the first process. */
 void cluster_broadcast(void *data, size_t bytes);
 
-/** The first failure, in the order of the processes, becomes everybody's, with its line. */
+/** Every process gets the first failure, in order of rank, with its message; GBT_OK if none failed. */
 gbt_status cluster_agree(gbt_status status, gbt_error *err);
 
-/** The first process's status becomes everybody's, with its line. */
+/** Every process gets the status of the first process, with its message. */
 gbt_status cluster_follow(gbt_status status, gbt_error *err);
 
-/** From now on, or no longer, this process does something of its own: as if it were alone. */
+/** on: from now on this process works independently, as if it were alone; off: no longer. */
 void cluster_apart(bool on);
 
-/** What this process has sent to others so far, or received where all get the same; and how long it was in
-   these calls. */
+/** Bytes that this process has sent so far (or received, in calls where all processes get the same), and the
+    seconds spent in these calls. */
 typedef struct cluster_traffic {
     uint64_t bytes;
     double seconds;

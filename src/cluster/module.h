@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/module.h -- what a module of the cluster does: MPI, seen from gbtrace. */
+/* cluster/module.h -- the interface of a loadable module: MPI as gbtrace sees it. */
 #ifndef GBT_CLUSTER_MODULE_H
 #define GBT_CLUSTER_MODULE_H
 
-/* Counts and places are of 32-bit words. */
+/* Counts and places (offsets) are in 32-bit words. */
 typedef struct cluster_module {
     int version; /* CLUSTER_MODULE_VERSION */
     void (*open)(int *rank, int *size);

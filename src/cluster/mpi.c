@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* cluster/mpi.c -- the module: collective calls of MPI 3. Built once for each MPI that is there, and loaded
-   when a process was started by its mpirun. MPI's own handler of errors stays: it ends all processes. */
+/* cluster/mpi.c -- the loadable module: implements the interface with collective calls of MPI 3.
+
+   It is built once for each installed MPI, and loaded in processes that were started by that MPI's mpirun.
+   MPI's default error handler is kept: it ends all processes. */
 #include <mpi.h>
 #include <stddef.h>
 

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* shim/image_oiio.cpp -- base/image.h on OpenImageIO: bytes to pixels and back, every exception stopped here.
+/* shim/image_oiio.cpp -- base/image.h on OpenImageIO: images from and to memory; no exception leaves this
+   file.
 
-   file --> bytes --> [magic: png, jpeg, openexr] --> that one plugin, from memory --> native samples
-        --> float in [0, 1]
+   file --> bytes --> [magic: png, jpeg, openexr] --> that one plugin, from memory --> native samples -->
+   float in [0, 1]
 
-   The plugin is chosen from the first bytes, so a file cannot reach one of OpenImageIO's other 20 parsers by
-   its name. A PNG is cut down to its pixel chunks first: libpng prints on stderr about damaged and odd
-   chunks, and OpenImageIO cannot stop it. */
+   The plugin is chosen by the first bytes, so that the file name cannot select one of OpenImageIO's 20 other
+   parsers. A PNG is reduced to its pixel chunks first, because libpng prints warnings about damaged and
+   unusual chunks to stderr, which OpenImageIO cannot prevent. */
 #include "base/image.h"
 
 #include <cmath>
@@ -37,7 +38,7 @@ namespace {
 
 constexpr int64_t max_samples = IMAGE_SAMPLES_MAX;
 constexpr size_t magic_bytes = 8;
-constexpr size_t reader_bytes = size_t(1) << 20; /* that a reader needs beside the pixels */
+constexpr size_t reader_bytes = size_t(1) << 20; /* memory that a reader needs besides the pixels */
 
 struct bytes_owner {
     unsigned char *bytes = nullptr;
@@ -48,8 +49,7 @@ struct bytes_owner {
     ~bytes_owner() { mem_free(bytes); }
 };
 
-/* Members are destroyed in reverse order, so the reader goes before the proxy and the bytes that it
-   borrows. */
+/* Members are destroyed in reverse order: first the reader, then the proxy and the bytes that it uses. */
 struct opened_image {
     image_header header;
     bytes_owner file;
@@ -66,8 +66,8 @@ std::string first_line(const std::string &text)
     return line.empty() ? std::string("no reason given") : line;
 }
 
-/* OpenImageIO reports some failures on the object and some globally; both must be emptied or the next call
-   inherits them. */
+/* OpenImageIO reports some errors on the object and some globally. Both must be fetched, or the next call
+   reports them. */
 std::string reason_of(const OIIO::ImageInput *input)
 {
     const std::string global = OIIO::has_error() ? OIIO::geterror() : std::string();
@@ -75,7 +75,9 @@ std::string reason_of(const OIIO::ImageInput *input)
     return first_line(own.empty() ? global : own);
 }
 
-/* libpng and libjpeg say in words that they had no memory; the last are those for a list that could not grow.
+/*
+ * libpng and libjpeg report lack of memory only in the text of their errors. The last two texts are those for
+ * a list that could not grow.
  */
 gbt_status status_of(const std::string &reason, gbt_status otherwise)
 {
@@ -92,7 +94,7 @@ gbt_status cannot_read(const char *path, const char *what, const OIIO::ImageInpu
     return base_fail(err, status_of(reason, GBT_ERR_FORMAT), "%s: %s: %s", path, what, reason.c_str());
 }
 
-/* Without a reason when there was no memory to make it. */
+/* OpenImageIO gives no reason when it lacked the memory to store one. */
 gbt_status no_plugin(const char *path, const char *plugin, const char *what, gbt_error *err)
 {
     const std::string reason = OIIO::has_error() ? first_line(OIIO::geterror()) : "out of memory";
@@ -105,8 +107,8 @@ uint32_t big_endian(const unsigned char *p)
     return uint32_t(p[0]) << 24 | uint32_t(p[1]) << 16 | uint32_t(p[2]) << 8 | uint32_t(p[3]);
 }
 
-/* Check every chunk and keep, in place, the ones that carry pixels; profiles, gamma and texts would not be
-   applied anyway. */
+/* Check every chunk, and keep in place those that affect pixels. Colour profiles, gamma and texts would not
+   be used anyway. */
 gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt_error *err)
 {
     static const char kept[][5] = {"IHDR", "PLTE", "tRNS", "IDAT", "IEND"};
@@ -144,9 +146,8 @@ gbt_status png_reduce(const char *path, unsigned char *bytes, size_t *count, gbt
     return GBT_OK;
 }
 
-/* What libpng, libjpeg and OpenEXR allocate is not checked everywhere inside of them: as much must be there
-   before they begin. The file may have become another one since its header was read; that is not a promise.
- */
+/* libpng, libjpeg and OpenEXR do not check all of their allocations, so check beforehand that there is enough
+   memory. This is no guarantee: the file may have changed since its header was read. */
 gbt_status check_memory(const char *path, const image_header &header, gbt_error *err)
 {
     const size_t samples = size_t(header.width) * size_t(header.height) * 4;
@@ -165,8 +166,8 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: image of %d x %d x %d pixels and %d channels (wanted at least 1 x 1 x 1 and 1)",
                          path, spec.width, spec.height, spec.depth, spec.nchannels);
-    /* Every product stays below 2^62 because each factor is a positive int and the first two are checked
-       before the third. */
+    /* No product exceeds 2^62: each factor is a positive int, and the first two are checked before the third.
+     */
     const int64_t pixels = int64_t(spec.width) * spec.height,
                   tile = int64_t(spec.tile_width) * spec.tile_height;
     if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples ||
@@ -179,15 +180,15 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: image has channels \"%s\" and \"%s\" (wanted grey, RGB or RGBA)", path,
                          spec.channel_name(0).c_str(), spec.channel_name(1).c_str());
-    /* An EXR may go on with depth, normals and the like: they come after RGB and are left, as is the alpha of
-       a layer. */
+    /* An EXR may have further channels after RGB, such as depth and normals, which are ignored; so is the
+       alpha of a layer. */
     const bool has_alpha =
         spec.nchannels > 3 && spec.alpha_channel == 3 && spec.channel_name(3).find('.') == std::string::npos;
     o->stored_channels = o->is_grey ? spec.nchannels : has_alpha ? 4 : 3;
     return GBT_OK;
 }
 
-/* The header comes first: what it refuses costs no memory. */
+/* The header is read first, so that rejecting a file costs no memory. */
 gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
 {
     static const char *const plugins[] = {"png", "jpeg", "openexr"}; /* by image_kind */
@@ -206,8 +207,8 @@ gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
     if (!o->input)
         return no_plugin(path, plugin, "reader", err);
     OIIO::ImageSpec config, spec;
-    config.attribute("oiio:UnassociatedAlpha", 1); /* colours as stored: a PNG's are not multiplied by
-                                                         alpha; an EXR's are, whatever is asked for */
+    config.attribute("oiio:UnassociatedAlpha", 1); /* keep colours as stored: a PNG's are then not multiplied
+                                                      by alpha; an EXR's are premultiplied in any case */
     o->proxy = std::make_unique<OIIO::Filesystem::IOMemReader>(o->file.bytes, o->file.count);
     if (!o->input->set_ioproxy(o->proxy.get()))
         return base_fail(err, GBT_ERR_INTERNAL, "%s: OpenImageIO's %s reader cannot read from memory", path,
@@ -217,7 +218,7 @@ gbt_status open_image(const char *path, opened_image *o, gbt_error *err)
     return check_spec(path, plugin, o, err);
 }
 
-/* Division, not multiplication by a rounded 1/255, so that a stored level is the float nearest to
+/* Division instead of multiplication by a rounded 1/255, so that each level becomes the float nearest to
    level/255. */
 template <typename level> std::vector<float> level_table()
 {
@@ -228,7 +229,7 @@ template <typename level> std::vector<float> level_table()
     return table;
 }
 
-/* Grey becomes three equal channels. */
+/* Convert samples; grey becomes three equal channels. */
 template <typename sample, typename convert>
 void expand(const sample *in, const opened_image &o, size_t pixels, float *out, convert to_float)
 {
@@ -252,14 +253,14 @@ gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, 
     const size_t pixels = size_t(out->width) * size_t(out->height);
     std::vector<sample> samples(pixels * size_t(o->stored_channels));
     const bool done = o->input->read_image(0, 0, 0, o->stored_channels, type, samples.data());
-    /* A truncated JPEG is "read" with grey in the missing part; only the error text tells. */
+    /* A truncated JPEG is read "successfully", with grey in the missing part; only the error text tells. */
     if (!done || o->input->has_error())
         return cannot_read(path, "damaged or truncated", o->input.get(), err);
     expand(samples.data(), *o, pixels, out->pixels, to_float);
     return GBT_OK;
 }
 
-/* Values that are not finite become 0; `valid`, if wanted, says in which pixels. */
+/* Replace values that are not finite by 0; `valid`, if wanted, marks the pixels without such values. */
 gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, gbt_error *err)
 {
     const size_t pixels = size_t(out->width) * size_t(out->height), channels = size_t(out->channels);
@@ -386,7 +387,8 @@ gbt_status encode_png(const image *im, std::vector<unsigned char> *bytes, gbt_er
     OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeUInt8);
     spec.attribute("oiio:UnassociatedAlpha", 1);
     spec.attribute("oiio:ColorSpace", "sRGB");
-    spec.attribute("png:compressionLevel", 4); /* the usual 6 takes three times as long for 8 % less */
+    spec.attribute("png:compressionLevel", 4); /* the default, 6, takes three times as long for a file 8 %
+                                                  smaller */
     return encode("png", "image.png", spec, samples.data(), bytes, err);
 }
 
@@ -396,7 +398,7 @@ gbt_status encode_exr(const image *im, std::vector<unsigned char> *bytes, gbt_er
     return encode("openexr", "image.exr", spec, im->pixels, bytes, err);
 }
 
-/* OpenImageIO leaves libjpeg's own answer to a failed allocation in place when it writes: exit(1). */
+/* When writing, OpenImageIO keeps libjpeg's default handling of a failed allocation, which is exit(1). */
 struct jpeg_exit_guard {
     jpeg_exit_guard() { library_exit_is_failure(true); }
     ~jpeg_exit_guard() { library_exit_is_failure(false); }
@@ -424,7 +426,7 @@ gbt_status hand_over(const std::vector<unsigned char> &from, unsigned char **byt
     return GBT_OK;
 }
 
-/* Called inside a catch handler only. */
+/* Convert the current exception to a status. Must be called inside a catch handler. */
 gbt_status caught(const char *path, gbt_status otherwise, gbt_error *err)
 try {
     throw;
@@ -436,7 +438,7 @@ try {
     return base_fail(err, otherwise, "%s: OpenImageIO failed", path);
 }
 
-/* `read` makes `out` of the opened file. */
+/* Open a file and let `read` fill `out` from it. */
 template <typename reader> gbt_status read_file(const char *path, image *out, gbt_error *err, reader read)
 try {
     std::memset(out, 0, sizeof *out);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* shim/out_of_memory.cpp -- the end of a program in which a library has no memory.
+/* shim/out_of_memory.cpp -- ends the program when a library runs out of memory.
 
-   At the failed allocation itself, not where its exception is caught: OpenImageIO throws with locks held, so
-   the next thread that wants one of them would wait forever. oneTBB throws without asking the handler of new,
-   on threads of its own, where nobody catches. jansson would say of a text that it is not JSON, and write a
-   file without the fields that it had no memory for. */
+   This happens at the failed allocation itself, not where an exception would be caught. OpenImageIO throws
+   while it holds locks, so another thread would wait for them forever. oneTBB throws without calling the new
+   handler, on threads of its own where nobody catches. jansson would report that a text is not JSON, and
+   would write a file without the fields for which it had no memory. */
 #include <atomic>
 #include <cstdlib>
 #include <exception>
@@ -26,11 +26,11 @@ static void end_once()
 {
     static std::atomic_flag ended = ATOMIC_FLAG_INIT;
     if (!ended.test_and_set()) {
-        file_writes_end(); /* their temporary files would be left */
+        file_writes_end(); /* removes their temporary files */
         end_process();
     }
     for (;;)
-        pause(); /* another thread has begun to end the process */
+        pause(); /* another thread is already ending the process */
 }
 
 static void end_by_exception()
@@ -42,7 +42,7 @@ static void end_by_exception()
         end_once();
     } catch (...) {
     }
-    std::set_terminate(nullptr); /* anything else is a defect, and ends as such */
+    std::set_terminate(nullptr); /* any other exception is a bug, and ends the program as usual */
     std::terminate();
 }
 
@@ -54,7 +54,7 @@ static void *alloc_for_json(size_t size)
     return memory;
 }
 
-/* exit() calls this on its own thread. */
+/* Registered with atexit(): turns a library's call of exit() into a failure, on the thread that made it. */
 static void at_exit()
 {
     if (exit_is_failure)

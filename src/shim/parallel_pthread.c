@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* shim/parallel_pthread.c -- base/parallel.h on plain threads, for the tsan preset: ThreadSanitizer sees
-   every lock of it.
+/* shim/parallel_pthread.c -- base/parallel.h with pthreads, for the tsan preset: ThreadSanitizer understands
+   every lock in it.
 
    Nested calls run on the calling thread. */
 #include "base/parallel.h"
@@ -45,10 +45,11 @@ int parallel_threads(void)
 static void *work(void *argument)
 {
     job *j = argument;
-    fenv_t saved; /* the same floating-point environment on every thread, whatever a library made of it */
+    fenv_t saved; /* every thread gets the same floating-point environment, whatever a library has set */
     fegetenv(&saved);
     fesetenv(FE_DFL_ENV);
-    inside += j->blocks > 1; /* one block alone leaves the threads to the calls in it */
+    inside +=
+        j->blocks > 1; /* a single block does not count as nesting: calls inside it may use the threads */
     for (;;) {
         const size_t block = atomic_fetch_add(&j->next, 1);
         if (block >= j->blocks)

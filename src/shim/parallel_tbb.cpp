@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* shim/parallel_tbb.cpp -- base/parallel.h on oneTBB. */
+/* shim/parallel_tbb.cpp -- base/parallel.h with oneTBB. */
 #include "base/parallel.h"
 
 #include <cfenv>
@@ -21,8 +21,7 @@ extern "C" {
 }
 
 static std::unique_ptr<tbb::global_control> limit;
-/* More threads than processors need an arena of their own: the one that oneTBB makes has a place for each
-   processor. */
+/* oneTBB's default arena has one slot per processor; more threads than that need an arena of their own. */
 static std::unique_ptr<tbb::task_arena> wide;
 static int thread_count = 0;
 
@@ -40,10 +39,11 @@ try {
         wide = std::make_unique<tbb::task_arena>(threads);
     thread_count = threads;
 } catch (...) {
-    /* Without a limit TBB uses every processor: slower to share, never wrong. */
+    /* Without a limit TBB uses every processor: possibly slower, but not wrong. */
 }
 
-/* oneTBB counts processors and knows nothing of the quotas of containers. */
+/* oneTBB counts processors and does not know the CPU quotas of containers, so the number of threads is
+   determined here. */
 extern "C" int parallel_threads(void)
 try {
     static std::once_flag once;
@@ -57,9 +57,9 @@ try {
     return 1;
 }
 
-/* The default floating-point environment as long as it lives. Embree switches its workers, which are ours
-   too, to flush denormals to zero: without this the bits would depend on the thread. It is nearly always in
-   force already, and to ask is cheap where to set it is not. */
+/* Sets the default floating-point environment during its lifetime. Embree switches its worker threads, which
+   are also ours, to flush denormals to zero; without this class results would depend on the thread. Usually
+   the default is already in force, and checking that is much cheaper than setting it. */
 class default_float_environment {
     std::fenv_t saved;
     const bool was_default;
@@ -67,7 +67,7 @@ class default_float_environment {
     static bool is_default()
     {
 #ifdef __SSE__
-        const unsigned flags = 0x3f, initial = 0x1f80; /* flags: what has happened, not what is in force */
+        const unsigned flags = 0x3f, initial = 0x1f80; /* flags: the exception flags, which are no setting */
         return (__builtin_ia32_stmxcsr() & ~flags) == initial;
 #else
         return false;
@@ -118,8 +118,8 @@ try {
     else
         run_all();
 } catch (...) {
-    /* The bodies are C and cannot throw, so only what TBB itself needs can fail, and then there is no way to
-       go on: gbt_when_out_of_memory(). */
+    /* The bodies are C and cannot throw, so only an allocation of TBB itself can fail;
+       gbt_when_out_of_memory() handles that. */
     std::terminate();
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/child.c -- fork, exec, pipes and waiting. */
+/* pose/child.c -- runs another program: fork, exec, pipes and waiting. */
 #include "pose/child.h"
 
 #include <errno.h>
@@ -21,8 +21,8 @@ enum { POLL_MS = 200, LINE_SIZE = 1024 };
 
 static const double patience = 10; /* seconds from SIGINT to SIGKILL */
 
-/* In the new process, where only calls that are safe in a signal handler are allowed. A process group of its
-   own: Ctrl-C reaches it once, through us. */
+/* Runs in the new process, where only async-signal-safe calls are allowed. It gets a process group of its
+   own, so that Ctrl-C does not reach it directly but only once, from us. */
 static void become(const char *const *arguments, int log, int output, bool whole, int failure)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -72,7 +72,7 @@ gbt_status child_start(child *c, const char *const *arguments, const char *log_p
     close(log);
     if (c->process > 0) {
         while (read(failure[0], &code, sizeof code) < 0 && errno == EINTR)
-            continue; /* the end of the file is a program that runs */
+            continue; /* exec succeeded, which closes the pipe: the program runs */
     }
     close(failure[0]);
     c->output = output[0];
@@ -86,7 +86,7 @@ gbt_status child_start(child *c, const char *const *arguments, const char *log_p
                      arguments[0], arguments[0]);
 }
 
-/* To all that it started, too: it may be a script around the program. */
+/* Signal the whole process group, because the program may be a script that started others. */
 static void signal_all(const child *c, int number)
 {
     if (kill(-c->process, number) != 0)
@@ -124,7 +124,8 @@ gbt_status child_read(child *c, void *out, size_t size, size_t *count, gbt_error
     }
 }
 
-/* It may close its output and go on: it is still told to stop. */
+/* Wait for the end. The program may close its output and keep running, so a request to stop is still passed
+   on. */
 static int wait_for(child *c)
 {
     int state = 0;
@@ -136,7 +137,7 @@ static int wait_for(child *c)
         const pid_t ended = waitpid(c->process, &state, WNOHANG);
         if (ended == c->process)
             break;
-        if (ended < 0 && errno != EINTR) { /* SIGCHLD is ignored: nobody knows how it ended */
+        if (ended < 0 && errno != EINTR) { /* SIGCHLD is ignored, so the exit status is lost */
             state = 255 << 8;
             break;
         }
@@ -176,9 +177,9 @@ void child_kill(child *c)
 /* ---- lines ---- */
 
 typedef struct lines {
-    char now[LINE_SIZE]; /* what of a line has come; longer lines are cut */
+    char now[LINE_SIZE]; /* the current line so far; longer lines are truncated */
     size_t used;
-    char last[LINE_SIZE]; /* not empty */
+    char last[LINE_SIZE]; /* the last line that is not empty */
     bool last_is_error;
     child_hear *hear;
     void *context;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/colmap.c -- command lines for COLMAP 3.6 to 4, and its progress from what it prints. */
+/* pose/colmap.c -- builds command lines for COLMAP 3.6 to 4, runs them, and follows their progress by the
+   output. */
 #include "pose/colmap.h"
 
 #include <math.h>
@@ -21,11 +22,11 @@
 
 enum {
     OPTIONS_MAX = 12,     /* of one command */
-    EXHAUSTIVE_FILM = 80, /* frames, photos: more are not matched each with each */
+    EXHAUSTIVE_FILM = 80, /* up to this many frames or photos, every pair is matched */
     EXHAUSTIVE_PHOTOS = 200,
-    OPENCV_LEAST = 20, /* photos of one camera that are enough for its eight parameters */
-    BLOCK = 10,        /* photos of a step of exhaustive matching */
-    KEY_FRAMES = 20    /* of a film, each matched with each: where it comes back */
+    OPENCV_LEAST = 20, /* as many photos of one camera determine its eight parameters */
+    BLOCK = 10,        /* photos in a block of exhaustive matching */
+    KEY_FRAMES = 20    /* of a film, matched exhaustively to find where the camera returns to a place */
 };
 
 /* ---- arguments ---- */
@@ -101,7 +102,7 @@ gbt_status colmap_find(const job *j, dialect *out, gbt_error *err)
 
 typedef struct progress {
     const char *stage;
-    uint64_t before, done, total; /* before: photos of earlier groups */
+    uint64_t before, done, total; /* before: photos in earlier groups */
 } progress;
 
 static void tell(progress *p, uint64_t done)
@@ -112,7 +113,7 @@ static void tell(progress *p, uint64_t done)
     }
 }
 
-/* The time of a stage begins here, not with its first line. */
+/* Start the clock of a stage now, not at its first line of output. */
 static progress begin(const char *stage, uint64_t total)
 {
     log_count(stage, 0, total, (double)NAN);
@@ -158,7 +159,7 @@ static void hear_mapping(const char *line, void *context)
 
 /* ---- features ---- */
 
-/* `photos` are of one camera. */
+/* The camera model for a group of `photos` photos. */
 static const char *model_name(const job *j, size_t photos, char name[CHOICE_TEXT_SIZE])
 {
     gbt_pose_camera model = j->def.camera_model;
@@ -167,7 +168,7 @@ static const char *model_name(const job *j, size_t photos, char name[CHOICE_TEXT
     return choice_name(GBT_POSE_CAMERA_NAMES, (int)model, name);
 }
 
-/* A list of the photos of a group, or of all of them (-1), one a line. */
+/* Write a list of the photos of a group, or of all photos (-1), one per line. */
 static gbt_status write_list(const job *j, int group, char path[JOB_PATH_SIZE], size_t *count, gbt_error *err)
 {
     char name[32];
@@ -189,7 +190,7 @@ static gbt_status write_list(const job *j, int group, char path[JOB_PATH_SIZE], 
     return status;
 }
 
-/* The camera that photos of the group have from a run that was stopped; 0: none. */
+/* The camera id that an interrupted run gave to the photos of the group; 0: none. */
 static gbt_status camera_of(const job *j, int group, uint32_t *camera, gbt_error *err)
 {
     database *d;
@@ -200,8 +201,7 @@ static gbt_status camera_of(const job *j, int group, uint32_t *camera, gbt_error
         return GBT_OK;
     gbt_status status = database_open(j->database, &d, &why);
     if (status == GBT_ERR_FORMAT)
-        return GBT_OK; /* COLMAP was stopped before it had made its tables; else it says itself what it finds
-                        */
+        return GBT_OK; /* stopped before COLMAP created its tables; anything worse COLMAP reports itself */
     if (status != GBT_OK)
         return base_fail(err, status, "%s", why.text);
     for (size_t i = 0; i < j->photo_count && found.camera == 0 && status == GBT_OK; i++)
@@ -271,7 +271,7 @@ static gbt_pose_matcher matcher_of(const job *j, size_t with_position)
     return with_position == j->photo_count ? GBT_POSE_MATCHER_SPATIAL : GBT_POSE_MATCHER_SEQUENTIAL;
 }
 
-/* @param steps [in] that its progress will count, as far as is known before */
+/* @param steps [in] number of steps that its progress will count, as far as known in advance */
 static gbt_status run_matcher(const job *j, const dialect *d, command_line *c, uint64_t steps, gbt_error *err)
 {
     char log_path[JOB_PATH_SIZE];
@@ -283,7 +283,8 @@ static gbt_status run_matcher(const job *j, const dialect *d, command_line *c, u
     return child_run(c->arguments, log_path, hear_matches, &p, err);
 }
 
-/* Frames evenly over the film, each with each: sequential matching does not see where it comes back. */
+/* Match frames evenly spaced over the film exhaustively: sequential matching alone does not notice when the
+   camera returns to a place. */
 static gbt_status match_key_frames(const job *j, const dialect *d, gbt_error *err)
 {
     char path[JOB_PATH_SIZE];
@@ -328,7 +329,8 @@ static gbt_status match(const job *j, const dialect *d, gbt_error *err)
     command_line c;
     begin_command(&c, j, verbs[matcher]);
     uint64_t steps = j->photo_count;
-    if (matcher == GBT_POSE_MATCHER_EXHAUSTIVE) { /* small blocks: progress, and little lost by a kill */
+    if (matcher == GBT_POSE_MATCHER_EXHAUSTIVE) { /* small blocks show progress, and lose little work when
+                                                     killed */
         const uint64_t blocks = (j->photo_count + BLOCK - 1) / BLOCK;
         add_number(&c, "ExhaustiveMatching.block_size", BLOCK);
         steps = blocks * blocks;
@@ -345,13 +347,14 @@ static gbt_status match(const job *j, const dialect *d, gbt_error *err)
 
 /* ---- mapping ---- */
 
-/* What COLMAP says when no two photos are a start: no failure of the program. */
+/* Whether COLMAP failed only because no two photos were suitable to start from; this is a result, not an
+   error. */
 static bool found_no_start(const gbt_error *why)
 {
     return strstr(why->text, "sparse model") != NULL || strstr(why->text, "initial image pair") != NULL;
 }
 
-/* What a run that was killed left. */
+/* Remove the models of a killed run. */
 static gbt_status remove_models(const job *j, gbt_error *err)
 {
     unsigned long largest;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/database.c -- queries, by SQLite. */
+/* pose/database.c -- queries COLMAP's database with SQLite. */
 #include "pose/database.h"
 
 #include <sqlite3.h>
@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
-/* COLMAP's number of a pair: the smaller id times this, and the larger one. */
+/* COLMAP's pair_id is the smaller image id times this plus the larger one. */
 enum { PAIR_IDS = 2147483647 };
 
 struct database {
@@ -19,8 +19,8 @@ struct database {
 
 static gbt_status failed(const database *d, gbt_error *err)
 {
-    const int code = sqlite3_errcode(d->file) & 0xff;  /* SQLITE_NOMEM when there is not even a `file` */
-    if (code == SQLITE_ERROR || code == SQLITE_NOTADB) /* a read that fails may be SQLITE_CORRUPT */
+    const int code = sqlite3_errcode(d->file) & 0xff;  /* SQLITE_NOMEM if there is no `file` */
+    if (code == SQLITE_ERROR || code == SQLITE_NOTADB) /* a failed read may also be SQLITE_CORRUPT */
         return base_fail(err, GBT_ERR_FORMAT, "%s: not a database of COLMAP: %s", d->path,
                          sqlite3_errmsg(d->file));
     return base_fail(err, code == SQLITE_NOMEM ? GBT_ERR_NO_MEMORY : GBT_ERR_IO, "%s: %s", d->path,
@@ -70,7 +70,8 @@ gbt_status database_find(database *d, const char *name, database_photo *out, gbt
     return code == SQLITE_ROW || code == SQLITE_DONE ? GBT_OK : failed(d, err);
 }
 
-/* A query of a table or a column that is not there counts nothing. */
+/* Add the result of a count. A missing table or column counts as 0, because it depends on COLMAP's version.
+ */
 static gbt_status add_count(database *d, const char *query, size_t *count, gbt_error *err)
 {
     sqlite3_stmt *statement;
@@ -85,8 +86,8 @@ static gbt_status add_count(database *d, const char *query, size_t *count, gbt_e
     return status;
 }
 
-/* COLMAP 3.12 moved positions to a table of their own. A photo of which it knows nothing but where down is
-   has a row, too, of three NaN: the sign and exponent of the first double are looked at. */
+/* COLMAP 3.12 moved the positions to a table of their own. A photo for which only the gravity direction is
+   known also has a row, with three NaN; it is recognised by the sign and exponent of the first double. */
 gbt_status database_positions(database *d, size_t *count, gbt_error *err)
 {
     *count = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/database.h -- what COLMAP's database says of photos: cameras, features, matches. */
+/* pose/database.h -- reads cameras, features and matches of photos from COLMAP's database. */
 #ifndef GBT_POSE_DATABASE_H
 #define GBT_POSE_DATABASE_H
 
@@ -10,22 +10,23 @@
 
 typedef struct database database;
 
-/** GBT_ERR_FORMAT for a file that is no database of COLMAP. Close with database_close() (NULL is fine). */
+/** GBT_ERR_FORMAT when the file is not a COLMAP database. Close with database_close() (NULL is fine). */
 gbt_status database_open(const char *path, database **out, gbt_error *err);
 void database_close(database *d);
 
 typedef struct database_photo {
-    uint32_t id, camera; /* COLMAP's */
+    uint32_t id, camera; /* as in COLMAP */
     int64_t features;
 } database_photo;
 
-/** A photo that is not there has id 0, which COLMAP gives to none. */
+/** Look up a photo by name. If there is none, the id is 0, which COLMAP never uses. */
 gbt_status database_find(database *d, const char *name, database_photo *out, gbt_error *err);
 
-/** How many photos have a position from GPS. */
+/** Count the photos that have a GPS position. */
 gbt_status database_positions(database *d, size_t *count, gbt_error *err);
 
-/** Pairs of photos whose matches fit one geometry: `pair` is called with both ids and their matches, >= 1. */
+/** Call `pair` for all pairs of photos that have matches consistent with one geometry, with both ids and the
+    number of these matches, >= 1. */
 gbt_status database_pairs(database *d, void (*pair)(uint32_t a, uint32_t b, int64_t matches, void *context),
                           void *context, gbt_error *err);
 

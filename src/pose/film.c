@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/film.c -- ffmpeg twice: small grey pictures of all frames, then the chosen ones. */
+/* pose/film.c -- runs ffmpeg twice: once for small grey pictures of all frames, once to decode the chosen
+   frames. */
 #include "pose/film.h"
 
 #include <errno.h>
@@ -18,8 +19,8 @@
 #include "pose/frames.h"
 
 enum {
-    BLOCK = 16,            /* pixels of a side: changes are those of means over blocks, free of noise */
-    BLOCKS_MAX = 64 * 256, /* of a picture of FRAMES_WIDTH; taller ones are no films */
+    BLOCK = 16,            /* side in pixels; change is measured on means of blocks, which suppresses noise */
+    BLOCKS_MAX = 64 * 256, /* for a picture of width FRAMES_WIDTH; taller ones are rejected */
     PICTURE_MAX = 1 << 24, /* bytes */
     FRAMES_LEAST = 60,
     FRAMES_MOST = 200
@@ -27,9 +28,9 @@ enum {
 
 static const double frames_a_second = 3;
 
-/* ---- what ffmpeg says ---- */
+/* ---- ffmpeg's messages ---- */
 
-/* The last line of a log, for an error. */
+/* The last line of a log, for an error message. */
 static void last_line(const char *log_path, char *out, size_t size)
 {
     char line[512];
@@ -44,7 +45,7 @@ static void last_line(const char *log_path, char *out, size_t size)
         fclose(log);
 }
 
-/* Seconds of the film, and frames a second: 0 when the log does not say. */
+/* The length of the film in seconds, and frames per second; 0 when the log does not state them. */
 static void read_length(const char *log_path, double *seconds, double *rate)
 {
     char line[512];
@@ -76,12 +77,12 @@ typedef struct measuring {
     unsigned char *picture; /* owned */
     size_t picture_capacity;
     int width, height;
-    float blocks[2][BLOCKS_MAX]; /* of this frame and the one before */
+    float blocks[2][BLOCKS_MAX]; /* block means of this frame and the one before */
     frame_measure *frames;       /* owned */
     size_t count, capacity;
 } measuring;
 
-/* `count` bytes, or fewer at the end. */
+/* Read `count` bytes, or fewer at the end. */
 static gbt_status take(measuring *m, unsigned char *out, size_t count, size_t *got, gbt_error *err)
 {
     *got = 0;
@@ -105,7 +106,7 @@ static gbt_status odd_output(gbt_error *err)
     return base_fail(err, GBT_ERR_IO, "ffmpeg: its output is not as wanted (wanted PGM pictures)");
 }
 
-/* A number of the header and the blank behind it. */
+/* Read a number of the PGM header and the blank after it. */
 static gbt_status take_number(measuring *m, int *out, gbt_error *err)
 {
     *out = 0;
@@ -123,7 +124,7 @@ static gbt_status take_number(measuring *m, int *out, gbt_error *err)
     return odd_output(err);
 }
 
-/* One PGM picture; `more` is false at the end. */
+/* Read one PGM picture; `more` is false at the end. */
 static gbt_status take_picture(measuring *m, bool *more, gbt_error *err)
 {
     unsigned char magic[3];
@@ -150,7 +151,7 @@ static gbt_status take_picture(measuring *m, bool *more, gbt_error *err)
     return got == size ? GBT_OK : odd_output(err);
 }
 
-/* Means of blocks of the frame, and how far they are from those of the frame before. */
+/* Compute the block means of the frame, and their mean difference from the frame before. */
 static double change_of(measuring *m)
 {
     float *now = m->blocks[m->count % 2], *before = m->blocks[(m->count + 1) % 2];
@@ -217,7 +218,7 @@ static gbt_status measure_film(const job *j, measuring *m, double *seconds, gbt_
                                      j->source, m->count);
 }
 
-/* ---- the chosen ones ---- */
+/* ---- decoding the chosen frames ---- */
 
 typedef struct decoding {
     uint64_t done, total;
@@ -233,7 +234,7 @@ static void hear_frame(const char *line, void *context)
     }
 }
 
-/* folder/frame_%05d.jpg, as ffmpeg wants it: a % of the folder's own name is doubled. */
+/* folder/frame_%05d.jpg for ffmpeg; a % in the folder's name is doubled. */
 static gbt_status pattern_of(const char *folder, char out[JOB_PATH_SIZE], gbt_error *err)
 {
     size_t used = 0;
@@ -248,7 +249,7 @@ static gbt_status pattern_of(const char *folder, char out[JOB_PATH_SIZE], gbt_er
     return GBT_OK;
 }
 
-/* select='eq(n,3)+eq(n,9)+...' */
+/* The filter select='eq(n,3)+eq(n,9)+...' for the chosen frames. */
 static gbt_status select_filter(const size_t *chosen, size_t count, sink *out)
 {
     sink_put_text(out, "select='");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/frames.c -- sharpness, and the choice of frames. */
+/* pose/frames.c -- measures sharpness, and chooses frames. */
 #include "pose/frames.h"
 
 #include <math.h>
@@ -9,7 +9,8 @@
 #include "base/memory.h"
 #include "data/photo_size.h"
 
-/* How far from the centre of its part a frame may be, in parts: two neighbours are never both at the seam. */
+/* How far from the centre of its part a frame may be, as a fraction of the part: below 1/2, so that frames of
+   neighbouring parts are not next to each other. */
 static const double middle = 0.35;
 
 double frames_sharpness(const unsigned char *grey, int width, int height)
@@ -40,8 +41,8 @@ static void set_places(frame_measure *frames, size_t count)
     }
 }
 
-/* The sharpest frame of [first, last] in the middle of a part; when there is none, the one nearest to its
-   centre. */
+/* The sharpest frame of [first, last] within `reach` of the centre; if there is none, the frame nearest to
+   the centre. */
 static size_t choose_one(const frame_measure *frames, size_t first, size_t last, double centre, double reach)
 {
     size_t nearest = first, sharpest = last + 1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/job.c -- files of DATA/colmap. */
+/* pose/job.c -- paths and marks of finished stages in DATA/colmap. */
 #include "pose/job.h"
 
 #include <dirent.h>
@@ -20,7 +20,7 @@ bool job_is_done(const job *j, const char *stage)
     file_kind kind;
     snprintf(name, sizeof name, "%s.done", stage);
     return job_path(j, name, path, NULL) == GBT_OK && file_look(path, &kind, NULL) == GBT_OK &&
-           kind != FILE_NONE; /* when in doubt, it is done once more */
+           kind != FILE_NONE; /* if unsure, the stage is repeated */
 }
 
 gbt_status job_set_done(const job *j, const char *stage, gbt_error *err)

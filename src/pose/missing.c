@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/missing.c -- features, matches and sharpness of the photos that were left out. */
+/* pose/missing.c -- explains why photos were left out: features, matches and sharpness. */
 #include "pose/missing.h"
 
 #include <stdint.h>
@@ -16,22 +16,23 @@
 
 enum {
     SHOWN = 10,
-    SAMPLE = 15, /* registered photos that stand for the usual sharpness */
+    SAMPLE = 15, /* registered photos from which the usual sharpness is taken */
     FEW_FEATURES = 200
 };
 
-static const double blurred = 0.3; /* of the usual sharpness: twice the blur leaves a quarter or less */
+static const double blurred =
+    0.3; /* fraction of the usual sharpness; blurring twice as much leaves a quarter or less */
 
 typedef struct facts {
-    int64_t features, matches;  /* matches: of all pairs, that fit one geometry */
-    int64_t registered_matches; /* of pairs with a registered photo */
+    int64_t features, matches;  /* number of matches, over all pairs, that are consistent with one geometry */
+    int64_t registered_matches; /* those of pairs with a registered photo */
     size_t partners, registered_partners;
 } facts;
 
 typedef struct table {
     const bool *registered;
     facts *rows;
-    size_t *place; /* [ids] of a photo by COLMAP's id, plus one; 0: none */
+    size_t *place; /* [ids] index of a photo by COLMAP's id, plus one; 0: none */
     uint32_t ids;
 } table;
 
@@ -90,7 +91,7 @@ static double sharpness_of(const job *j, size_t photo)
     return sharpness;
 }
 
-/* The median of some registered photos. */
+/* The median sharpness of some registered photos. */
 static double usual_sharpness(const job *j, const bool *registered, size_t count)
 {
     double values[SAMPLE];
@@ -105,7 +106,7 @@ static double usual_sharpness(const job *j, const bool *registered, size_t count
     return used > 0 ? values[used / 2] : 0;
 }
 
-/* ---- lines ---- */
+/* ---- output ---- */
 
 static void why(const job *j, size_t photo, const facts *f, double usual, char *out, size_t size)
 {

@@ -5,8 +5,8 @@
 
 #include "pose/job.h"
 
-/** A line for each photo that is not `registered` [photo_count]: the first ones on `report` (NULL: none), all
-    in DATA/colmap/not_registered.txt. */
+/** Write a line for each photo that is not in `registered` [photo_count]: the first ones to `report` (NULL:
+    none), all of them to DATA/colmap/not_registered.txt. */
 gbt_status missing_report(const job *j, const bool *registered, FILE *report, gbt_error *err);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/photos.c -- folders, headers, EXIF, links. */
+/* pose/photos.c -- lists the photos of a folder, groups them by camera, and links them into DATA. */
 #include "pose/photos.h"
 
 #include <dirent.h>
@@ -26,7 +26,7 @@ static void leave_out(job *j, const char *why)
         log_warn("left out: %s", why);
 }
 
-/* What a header does not show of damage is seen where EXIF is looked for, in the whole file. */
+/* Add a photo. Damage behind its header is noticed when the whole file is searched for EXIF data. */
 static gbt_status take_photo(job *j, const char *path, const char *name, gbt_error *err)
 {
     image_header header;
@@ -55,7 +55,8 @@ static gbt_status take_photo(job *j, const char *path, const char *name, gbt_err
     return GBT_OK;
 }
 
-/* `below`: the part of the path that is in names; empty or ending in a slash. */
+/* Add the photos of a folder and its sub-folders. `below`: path of the folder relative to `root`, which
+   becomes part of the names; empty, or with a slash at the end. */
 static gbt_status walk(job *j, const char *root, const char *below, int depth, gbt_error *err)
 {
     char folder[JOB_PATH_SIZE], path[JOB_PATH_SIZE], name[JOB_PATH_SIZE];
@@ -80,7 +81,8 @@ static gbt_status walk(job *j, const char *root, const char *below, int depth, g
             if (strcmp(name, "masks/") == 0)
                 log_warn("%s: not used to find poses (copy it to %s/masks, where train reads masks)", path,
                          j->data);
-            else if (depth < DEPTH_MAX && !file_is_same(path, j->data)) /* its photos are links to these */
+            else if (depth < DEPTH_MAX && !file_is_same(path, j->data)) /* not DATA itself, whose photos are
+                                                                           links to these */
                 status = walk(j, root, name, depth + 1, err);
         } else if (status == GBT_OK && unposed_is_photo(name)) {
             status = take_photo(j, path, name, err);
@@ -113,7 +115,7 @@ gbt_status photos_list(job *j, const char *folder, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- which share a camera ---- */
+/* ---- groups that share a camera ---- */
 
 static bool same_camera(const job_photo *a, const job_photo *b)
 {
@@ -123,7 +125,7 @@ static bool same_camera(const job_photo *a, const job_photo *b)
 
 void photos_group(job *j)
 {
-    const job_photo *first[JOB_GROUPS_MAX]; /* of each group */
+    const job_photo *first[JOB_GROUPS_MAX]; /* the first photo of each group */
     j->groups = 0;
     for (size_t i = 0; i < j->photo_count; i++) {
         job_photo *photo = &j->photos[i];

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/pose.c -- one call: the folder, its settings, the stages.
+/* pose/pose.c -- runs gbt_pose(): prepares the folder, checks its settings, runs the stages that are not
+   finished.
 
    source --> [film: sharp frames] --> DATA/images --> features --> matching --> mapping --> DATA/sparse/0
-   DATA/colmap says what is finished, and with which settings it was begun. */
+   DATA/colmap records which stages are finished, and the settings of the first call. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -86,7 +87,7 @@ static gbt_status set_folders(job *j, const char *source, const char *data, gbt_
     return GBT_OK;
 }
 
-/* ---- what the folder was begun with ---- */
+/* ---- the settings of the first call ---- */
 
 static void put_setting(sink *out, const char *name, const char *value)
 {
@@ -96,7 +97,7 @@ static void put_setting(sink *out, const char *name, const char *value)
     sink_put_text(out, "\n");
 }
 
-/* Its size in bytes, and when it was written in seconds, tell it from another file of that name. */
+/* The size in bytes and the modification time distinguish a file from another one of the same name. */
 static gbt_status put_file(sink *out, const char *setting, const char *name, const char *path)
 {
     struct stat info;
@@ -108,7 +109,7 @@ static gbt_status put_file(sink *out, const char *setting, const char *name, con
     return out->status;
 }
 
-/** @param files [in] with what put_file() says of the film and of photos, not their names alone */
+/** @param files [in] true: with size and time of the film or the photos (put_file()), not only their names */
 static gbt_status settings_text(const job *j, bool files, sink *out)
 {
     char frames[16], path[JOB_PATH_SIZE];
@@ -140,7 +141,7 @@ static gbt_status compare_settings(const job *j, const char *path, const sink *n
 {
     unsigned char *then;
     size_t size;
-    sink names = {.err = err}; /* older folders say no more */
+    sink names = {.err = err}; /* folders of older versions list only names */
     GBT_TRY(file_read(path, &then, &size, err));
     const gbt_status status = settings_text(j, false, &names);
     const bool same = status == GBT_OK && (is_same(now, then, size) || is_same(&names, then, size));
@@ -154,7 +155,7 @@ static gbt_status compare_settings(const job *j, const char *path, const sink *n
                            j->data, path);
 }
 
-/* DATA must be ours, or hold nothing that we would write. */
+/* DATA must be a folder that gbt_pose() made, or contain nothing that it would overwrite. */
 static gbt_status check_folder(const job *j, gbt_error *err)
 {
     char settings[JOB_PATH_SIZE], sparse[JOB_PATH_SIZE];
@@ -187,7 +188,9 @@ static gbt_status begin(const job *j, gbt_error *err)
     return status;
 }
 
-/* Two calls in one folder would spoil it. The lock goes with the process, and with COLMAP's that it started.
+/*
+ * Two calls must not work in one folder. The lock is released when this process and the COLMAP that it
+ * started have ended.
  */
 static gbt_status lock(const job *j, int *out, gbt_error *err)
 {
@@ -208,7 +211,7 @@ static gbt_status lock(const job *j, int *out, gbt_error *err)
 static gbt_status find_poses(job *j, gbt_error *err)
 {
     dialect colmap;
-    GBT_TRY(colmap_find(j, &colmap, err)); /* before a film is decoded for minutes */
+    GBT_TRY(colmap_find(j, &colmap, err)); /* fail now, not after minutes of decoding a film */
     if (j->is_film && !file_exists(j->images))
         GBT_TRY(film_to_photos(j, err));
     if (j->is_film)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose/result.c -- choose a model, copy it, describe it. */
+/* pose/result.c -- chooses one of COLMAP's models, copies it and describes it. */
 #include "pose/result.h"
 
 #include <errno.h>
@@ -15,7 +15,7 @@
 #include "data/colmap_bin.h"
 #include "pose/missing.h"
 
-/* The first three are a model; COLMAP 4 adds the others. */
+/* The first three files make a model; COLMAP 4 adds the others. */
 static const char *const names[] = {"cameras.bin", "images.bin", "points3D.bin", "rigs.bin", "frames.bin"};
 enum { NAMES = sizeof names / sizeof *names, NAMES_NEEDED = 3 };
 
@@ -24,7 +24,7 @@ typedef struct found_model {
     unsigned char *bytes[NAMES_NEEDED]; /* owned */
     char paths[NAMES_NEEDED][JOB_PATH_SIZE];
     raw_scene raw;
-    double error; /* mean over points, pixels */
+    double error; /* mean reprojection error of the points, pixels */
 } found_model;
 
 static void model_free(found_model *m)
@@ -35,7 +35,7 @@ static void model_free(found_model *m)
     mem_free(m);
 }
 
-/* points3D.bin has been read once: its records are whole. */
+/* No bounds checks are needed: points3D.bin has already been read, so its records are complete. */
 static double mean_error(const source_file *points)
 {
     enum { BEFORE_ERROR = 8 + 24 + 3, TRACK_ENTRY = 8 };
@@ -77,7 +77,7 @@ static gbt_status model_read(const char *folder, found_model **out, gbt_error *e
     return status;
 }
 
-/* ---- which one ---- */
+/* ---- choosing a model ---- */
 
 static gbt_status find_largest(const job *j, char best[JOB_PATH_SIZE], gbt_error *err)
 {
@@ -94,7 +94,7 @@ static gbt_status find_largest(const job *j, char best[JOB_PATH_SIZE], gbt_error
         if (kind != FILE_FOLDER)
             continue;
         const gbt_status status = model_read(folder, &m, err);
-        if (status == GBT_ERR_FORMAT) /* COLMAP does not notice when the disk is full */
+        if (status == GBT_ERR_FORMAT) /* COLMAP does not notice a full disk; map again next time */
             job_set_undone(j, "mapping");
         GBT_TRY(status);
         models++;
@@ -148,7 +148,7 @@ gbt_status result_take(const job *j, gbt_error *err)
     return GBT_OK;
 }
 
-/* ---- what is said ---- */
+/* ---- the report ---- */
 
 static void say_cameras(const raw_scene *raw, FILE *report)
 {

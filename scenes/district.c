@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/district.c -- a district of streets and blocks of houses, for scenes that are large: cameras walk
-   its streets and fly over it, and each sees a small part. */
+/* scenes/district.c -- a district of streets and blocks of houses, as an example of a large scene: cameras
+   walk its streets and fly over it, and each sees only a small part. */
 #include <math.h>
 #include <string.h>
 
@@ -14,10 +14,10 @@ enum { BLOCKS = 8, LOTS = 3 /* houses along one side of a block */ };
 
 static const float dome_radius = 190, pitch = 24, street = 8, window_width = 1.5f, floor_height = 3.0f;
 
-/** Middle of block `i` along an axis. */
+/** The centre of block `i` along an axis. */
 static float block_middle(int i) { return pitch * ((float)i - 0.5f * (BLOCKS - 1)); }
 
-/** Distance from the middle of the nearest street along an axis. */
+/** Distance from the centre line of the nearest street along an axis. */
 static float street_distance(float x)
 {
     const float at = x / pitch;
@@ -169,8 +169,8 @@ static void build(world *w)
     world_place(w, 0, 0, 0, 0);
 }
 
-/** Two of three cameras walk: along the streets in turn, looking ahead and to one side. The others fly over
-    the blocks in rows and look down. Eight views that follow each other are of all kinds. */
+/** Two of three cameras walk along the streets in turn, looking ahead and to one side. The third flies over
+    the blocks in rows and looks down. Any eight consecutive views include both kinds. */
 static void stand(int view, int view_count, double eye[3], double target[3])
 {
     const double half = 0.5 * (double)pitch * BLOCKS, part = (view + 0.5) / view_count;

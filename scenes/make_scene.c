@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/make_scene.c -- a recipe and a def to a folder of photos, cameras and sparse points. */
+/* scenes/make_scene.c -- gbt_make_scene(): turns a recipe and a def into a folder of photos, cameras and
+   sparse points. */
 #include "gbtrace/make_scene.h"
 
 #include <inttypes.h>
@@ -45,7 +46,7 @@ gbt_make_scene_def gbt_make_scene_def_default(void)
 
 const char *const *gbt_make_scene_names(void)
 {
-    /* Kept beside `recipes`; tests compare the two through gbt_make_scene(). */
+    /* Must match `recipes`; tests compare the two through gbt_make_scene(). */
     static const char *const names[RECIPE_COUNT + 1] = {"tabletop", "courtyard", "terrain", "district", NULL};
     return names;
 }
@@ -131,18 +132,19 @@ static void set_lens(const recipe *r, const gbt_make_scene_def *def, gbt_camera 
     }
 }
 
-/* While row after row is read out the camera moves by some hundredths of its distance from the target, and
-   turns by some degrees: a phone in a hand that does not stop for the photo. */
+/* While the rows are read out one after the other, the camera moves by some hundredths of its distance from
+   the target and turns by some degrees: like a hand-held phone that does not stop for the photo. */
 static void roll(const gbt_make_scene_def *def, int view, double distance, gbt_camera *camera)
 {
-    static const double move = 0.02, turn = 0.02; /* std-dev; of the distance, and radians */
+    static const double move = 0.02,
+                        turn = 0.02; /* standard deviations: fraction of the distance, and radians */
     camera->shutter = GBT_CAMERA_SHUTTER_ROWS;
     for (int k = 0; k < 6; k++)
         camera->motion[k] = (k < 3 ? move * distance : turn) *
                             rng_normal(def->seed, STREAM_CAMERA + 6 + (uint64_t)k, (uint64_t)view);
 }
 
-/** View number `view` of `def`: on one of the rings, looking at the target, both moved a little. */
+/** View number `view` of `def`: from one of the rings towards the target, with both positions jittered. */
 static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, int view)
 {
     gbt_camera camera = {.width = def->width, .height = def->height};
@@ -272,7 +274,8 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
 {
     gbt_status status = GBT_ERR_NO_MEMORY;
     const size_t views = (size_t)def->view_count;
-    /* Up to five candidates for a point: where views hardly overlap, most are seen by too few. */
+    /* Up to five candidates per wanted point: where views hardly overlap, most candidates are seen by too few
+       views. */
     const size_t per_view = ((size_t)def->points * 5 + views - 1) / views + 4;
     gbt_camera *cameras = mem_alloc(views, sizeof *cameras, "cameras", err);
     char(*names)[NAME_SIZE] = mem_alloc(views, sizeof *names, "view names", err);
@@ -325,7 +328,8 @@ done:
     return status;
 }
 
-/* Readers take COLMAP's cameras where there are some, and a rolling shutter is not in them. */
+/* A folder must not have both kinds of camera files: readers prefer COLMAP's, which cannot describe a rolling
+   shutter. */
 static gbt_status check_other_cameras(const gbt_make_scene_def *def, const char *folder, gbt_error *err)
 {
     char path[PATH_SIZE];
@@ -351,10 +355,12 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
     GBT_TRY(make_folder(folder, "images", err));
     if (def->depth)
         GBT_TRY(make_folder(folder, "depth", err));
-    GBT_TRY(write_about(r, def, folder, err)); /* first: it says whose folder this is, however far it came */
+    GBT_TRY(write_about(r, def, folder, err)); /* written first, so that even an incomplete folder says where
+                                                  it comes from */
     world w = {.err = err};
     r->build(&w);
-    /* A rough picture gets rough light: the default number of samples gets all of it. */
+    /* Fewer samples also reduce the number of rays for the indirect light; the default number of samples gets
+       all of them. */
     const int share = def->samples < 16 ? def->samples : 16;
     gbt_status status = world_finish(&w, (r->bake_rays * share + 15) / 16);
     if (status == GBT_OK)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/photo.c -- stratified, adaptive sampling of a world. */
+/* scenes/photo.c -- renders a world with stratified, adaptive sampling. */
 #include "scenes/photo.h"
 
 #include <math.h>
@@ -9,8 +9,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 
-/* Largest difference of displayed colour among the first samples that still counts as one colour: 15 of
-   255. */
+/* The largest difference of displayed colour among the first samples that counts as one colour: 15 of 255. */
 static const float same_color = 0.06f;
 
 bool photo_ray(const gbt_camera *camera, double px, double py, float origin[3], float dir[3])
@@ -33,13 +32,13 @@ typedef struct photo_job {
     image *out;
 } photo_job;
 
-/** Strata of the first pass: a quarter of all, one per row and column of every 4 x 4 block; all where there
-    are too few to choose from. */
+/** The strata of the first pass: a quarter of all, one per row and column of every 4 x 4 block; or all, where
+    there are too few. */
 static bool is_first_pass(int x, int y, int side) { return side <= 2 || (x + 2 * y + y / 2) % 4 == 0; }
 
 static float fraction(float x) { return x - floorf(x); }
 
-/** @return the material seen with its variant, -1 for the sky */
+/** @return the material that is seen, combined with its variant; -1 for the sky */
 static int sample(const photo_job *job, int column, int row, int x, int y, int number, float rgb[3])
 {
     const uint64_t pixel = (uint64_t)row * (uint64_t)job->camera->width + (uint64_t)column;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/place.h -- colours, boxes and tubes by their numbers, as recipes of scenes write them. */
+/* scenes/place.h -- short forms for colours, boxes and tubes in scene recipes. */
 #ifndef GBT_SCENES_PLACE_H
 #define GBT_SCENES_PLACE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/shapes.c -- shapes to triangles. Light and rays are in world.c. */
+/* scenes/shapes.c -- turns shapes into triangles. Light and rays are in world.c. */
 #include <math.h>
 #include <string.h>
 
@@ -11,7 +11,7 @@ enum { MAX_PROFILE = 256, MAX_CELLS = 1024 };
 
 static const float turn = 6.28318530718f;
 
-/** Room for one more element of `size` bytes in one of the world's arrays. */
+/** Make room for one more element of `size` bytes in one of the world's arrays. */
 static bool reserve(world *w, void *array, int slot, size_t used, size_t size)
 {
     if (w->status == GBT_OK)
@@ -65,7 +65,8 @@ void world_triangle(world *w, int material, int variant, uint32_t a, uint32_t b,
     w->triangle_count = n + 1;
 }
 
-/** The two triangles of each cell of a grid of vertices that starts at `first`, rows of `columns` + 1. */
+/** Add the two triangles of each cell of a grid of vertices, which starts at `first` and has rows of
+    `columns` + 1. */
 static void stitch(world *w, int material, int variant, uint32_t first, int columns, int rows)
 {
     const uint32_t stride = (uint32_t)columns + 1;
@@ -151,8 +152,8 @@ void world_ball(world *w, int material, int variant, const float center[3], floa
     world_blob(w, material, variant, center, radius, 1, 0, 1, segments);
 }
 
-/** Normals of the vertices from `first` on as the sum of the triangles around them: for shapes that noise has
-    bent. */
+/** Set the normals of the vertices from `first` on to the area-weighted mean of the triangles around them;
+   for shapes that were deformed by noise. */
 static void smooth_normals(world *w, uint32_t first, size_t first_triangle)
 {
     if (w->status != GBT_OK)
@@ -177,7 +178,7 @@ static void smooth_normals(world *w, uint32_t first, size_t first_triangle)
             n[1] /= length;
             n[2] /= length;
         } else
-            n[2] = 1; /* the two poles have triangles of no area */
+            n[2] = 1; /* the triangles at the two poles have no area */
     }
 }
 
@@ -236,7 +237,8 @@ void world_tube(world *w, int material, const float a[3], const float b[3], floa
         return;
     for (int k = 0; k < 3; k++)
         axis[k] /= length;
-    /* Any direction across the axis will do; take it from the coordinate that the axis has least of. */
+    /* Any direction perpendicular to the axis will do; start from the coordinate in which the axis is
+       smallest. */
     float across[3] = {0};
     across[fabsf(axis[0]) < 0.6f ? 0 : fabsf(axis[1]) < 0.6f ? 1 : 2] = 1;
     const float along = across[0] * axis[0] + across[1] * axis[1] + across[2] * axis[2];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/sparse.c -- chosen pixels -> surface points -> tracks -> files of cameras and points. */
+/* scenes/sparse.c -- chosen pixels -> surface points -> tracks -> files of cameras and sparse points. */
 #include "scenes/sparse.h"
 
 #include <math.h>
@@ -21,15 +21,16 @@
 /* Streams of random numbers; photos use 1 to 10000 (photo.c), cameras 2^24 and after (make_scene.c). */
 enum { STREAM_CHOICE = 1 << 20, STREAM_TRACK = 1 << 21, STREAM_NOISE = 1 << 22, STREAM_OUTLIER = 1 << 23 };
 
-enum { MIN_TRACK = 3, OUTLIER_EVERY = 100, ROUND = 16384 /* candidates that are looked at together */ };
+enum { MIN_TRACK = 3, OUTLIER_EVERY = 100, ROUND = 16384 /* candidates processed together */ };
 
 static const double observation_noise_px = 0.3;
-static const float least_cosine = 0.15f; /* flatter views find no features */
-static const double keep_share = 0.6;    /* part of the views that see a point whose detector finds it */
+static const float least_cosine = 0.15f; /* surfaces seen at a flatter angle give no features */
+static const double keep_share = 0.6;    /* fraction of the views of a point in which the detector finds it */
 
 void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t wanted, sparse_seed *out)
 {
-    /* Of three places take the one where the picture changes most: blank walls still get some. */
+    /* Take the one of three random positions where the picture changes most; blank walls thus still get some.
+     */
     for (size_t i = 0; i < wanted; i++) {
         float best = -1;
         for (uint64_t attempt = 0; attempt < 3; attempt++) {
@@ -61,19 +62,19 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
 /** One candidate and the views that observe it. */
 typedef struct track {
     double point[3];
-    float dir[3]; /* of the ray of its first view, unit */
+    float dir[3]; /* of the ray from its first view, unit */
     unsigned char color[3];
-    uint32_t count; /* of these views; 0: no usable track */
+    uint32_t count; /* number of these views; 0: no usable track */
 } track;
 
 typedef struct search {
     const sparse_def *def;
-    size_t first;        /* of the candidates that this round looks at */
+    size_t first;        /* index of the first candidate of this round */
     track *tracks;       /* [ROUND] of this round, as all that follows */
     unsigned char *seen; /* [ROUND][view_count]: 1 where the view observes the candidate */
 } search;
 
-/** Does a view see this point of a surface in frame, unhidden and not too flat? */
+/** Does a view see this surface point: inside the picture, not hidden, and not at too flat an angle? */
 static bool sees(const search *q, size_t view, const double point[3], const float normal[3])
 {
     const gbt_camera *camera = q->def->cameras + view;
@@ -106,7 +107,7 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     const search *q = context;
     for (size_t i = q->first + begin; i < q->first + end; i++) {
-        /* Candidates go round the views, so that a prefix of the list covers all of them. */
+        /* Candidates alternate between the views, so that any prefix of the list covers all of them. */
         const size_t view = i % q->def->view_count;
         const sparse_seed *at = q->def->seeds + view * q->def->per_view + i / q->def->view_count;
         track *t = q->tracks + (i - q->first);
@@ -137,7 +138,7 @@ static void find_tracks(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/** Where a view saw the true point: its projection and the detector's noise. */
+/** Where a view observed the point: its projection plus the detector's noise. */
 static void observe(const search *q, size_t candidate, size_t view, double pixel[2])
 {
     gbt_camera_pixel(q->def->cameras + view, q->tracks[candidate - q->first].point, pixel);
@@ -146,7 +147,7 @@ static void observe(const search *q, size_t candidate, size_t view, double pixel
             observation_noise_px * rng_normal(q->def->seed, STREAM_NOISE + 2 * view + (uint64_t)k, candidate);
 }
 
-/** The position that is written: the true one with noise, or an outlier. */
+/** The position that is written: the true one plus noise, or an outlier. */
 static void disturb(const search *q, size_t candidate, size_t number, double out[3])
 {
     const track *t = q->tracks + (candidate - q->first);
@@ -190,7 +191,7 @@ static double reprojection_error(const search *q, size_t candidate, const double
 
 typedef struct cloud {
     colmap_point *points;              /* [capacity] */
-    uint32_t (*track)[2];              /* all tracks one after the other */
+    uint32_t (*track)[2];              /* all tracks, one after the other */
     colmap_observation **observations; /* [view_count] */
     size_t *observation_count, *observation_capacity;
     colmap_image *images;
@@ -210,7 +211,7 @@ static void cloud_free(cloud *c, size_t view_count)
     memset(c, 0, sizeof *c);
 }
 
-/* The points of this round, up to def->wanted in all. */
+/* Add the points of this round, up to def->wanted in total. */
 static gbt_status collect(const search *q, size_t count, cloud *c, gbt_error *err)
 {
     for (size_t i = q->first; i < q->first + count && c->point_count < q->def->wanted; i++) {
@@ -246,7 +247,7 @@ static gbt_status collect(const search *q, size_t count, cloud *c, gbt_error *er
     return GBT_OK;
 }
 
-/* The track array has stopped moving: only now may points refer to it. */
+/* Set the points' pointers to their tracks; only now, because the array of tracks moves while it grows. */
 static void refer_to_tracks(cloud *c)
 {
     for (size_t i = 0, next = 0; i < c->point_count; i++) {
@@ -267,7 +268,7 @@ static gbt_status write_colmap(cloud *c, const sparse_def *def, const char *fold
     return colmap_write(path, c->images, def->view_count, c->points, c->point_count, err);
 }
 
-/* Cameras that move while they are read out, which no COLMAP model holds. */
+/* Write cameras with a rolling shutter, which a COLMAP model cannot describe. */
 static gbt_status write_transforms(const cloud *c, const sparse_def *def, const char *folder, gbt_error *err)
 {
     char path[4096];

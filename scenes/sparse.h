@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/sparse.h -- the sparse cloud that structure from motion would have found, from known surfaces. */
+/* scenes/sparse.h -- makes, from known surfaces, the sparse cloud that structure from motion would have
+   found. */
 #ifndef GBT_SCENES_SPARSE_H
 #define GBT_SCENES_SPARSE_H
 
@@ -10,13 +11,13 @@
 #include "gbtrace/camera.h"
 #include "scenes/world.h"
 
-/** A place of a photo where a detector could have found something. */
+/** An image point at which a feature detector could have found something. */
 typedef struct sparse_seed {
     float px, py;
 } sparse_seed;
 
 /**
- * Choose image points of one photo, more where the picture changes.
+ * Choose image points of one photo, with more of them where the picture changes.
  *
  * @param wanted how many to choose
  * @param out    [out] [wanted]
@@ -26,21 +27,22 @@ void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t want
 typedef struct sparse_def {
     const world *w;
     const gbt_camera *cameras; /* [view_count] */
-    const char *const *names;  /* [view_count]: of the photos' files */
+    const char *const *names;  /* [view_count]: names of the photo files */
     size_t view_count;
     const sparse_seed *seeds; /* [view_count][per_view] */
     size_t per_view;
     size_t wanted;      /* points, at most */
-    double point_noise; /* of positions, a share of the distance to the nearest view, per axis */
-    float sight;        /* a view finds no point that is farther; 0: no limit */
+    double point_noise; /* standard deviation of positions per axis, as a fraction of the distance to the
+                           nearest view */
+    float sight;        /* a view sees no points beyond this distance; 0: no limit */
     uint64_t seed;
 } sparse_def;
 
 /**
- * Follow the chosen points to the surfaces, find the views that see them, and write folder/sparse/0; for
- * cameras that move while they are read out folder/transforms.json and points.ply.
+ * Trace the chosen points to the surfaces, find the views that see them, and write folder/sparse/0; for
+ * cameras with a rolling shutter folder/transforms.json and points.ply instead.
  *
- * Memory: the points and their observations, some 100 bytes and 32 for each view of a point.
+ * Memory: the points and their observations, about 100 bytes per point and 32 per view of a point.
  */
 gbt_status sparse_write(const sparse_def *def, const char *folder, gbt_error *err);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/surface_gaussians.c -- places on triangles -> colours -> rows of a .ply, batch by batch. */
+/* scenes/surface_gaussians.c -- samples points on triangles, takes their colours, and writes them as
+   Gaussians, batch by batch. */
 #include "scenes/surface_gaussians.h"
 
 #include <math.h>
@@ -11,15 +12,15 @@
 #include "base/rng.h"
 #include "data/bytes.h"
 
-enum { BLOCK = 512, BATCH = 64 /* blocks that are written together */, REST = 45 };
+enum { BLOCK = 512, BATCH = 64 /* blocks written together */, REST = 45 };
 enum { STREAM_PLACE = 1 << 25, STREAM_REST = 1 << 26 };
 
-static const float sky_share = 0.01f; /* of the Gaussians that matt surfaces of that area would get */
+static const float sky_share = 0.01f; /* density on the sky relative to that on other surfaces */
 static const double sh_0 = 0.28209479177387814;
 
 typedef struct spread {
     const world *w;
-    double *end; /* [triangle_count] weights up to here */
+    double *end; /* [triangle_count] cumulative weights */
     size_t count, first;
     uint64_t seed;
     sink *rows; /* [BATCH] */
@@ -59,7 +60,7 @@ static void weigh_triangles(spread *s)
     }
 }
 
-/* The first triangle whose end is beyond `at`. */
+/* The first triangle whose cumulative weight exceeds `at`. */
 static size_t triangle_at(const spread *s, double at)
 {
     size_t low = 0, high = s->w->triangle_count - 1;
@@ -73,7 +74,7 @@ static size_t triangle_at(const spread *s, double at)
     return low;
 }
 
-/* A point of a triangle as a ray from in front sees it. */
+/* A point of a triangle as a ray would see it from the front. */
 static void surface_at(const world *w, size_t triangle, float u, float v, surface *out)
 {
     const float weight[3] = {1 - u - v, u, v};
@@ -126,11 +127,11 @@ static void put_row(const spread *s, size_t number, sink *out)
     }
     const bool sky = shines(s->w, triangle);
     const double spacing = sqrt(share / (sky ? (double)sky_share : 1));
-    sink_put_f32(out, 2.2f); /* an opacity of 0.9 */
+    sink_put_f32(out, 2.2f); /* logit of the opacity 0.9 */
     sink_put_f32(out, (float)log(0.7 * spacing));
     sink_put_f32(out, (float)log(0.7 * spacing));
     sink_put_f32(out, (float)log(0.1 * spacing));
-    const float half = sqrtf(0.5f * (1 + n[2])); /* from z to the normal */
+    const float half = sqrtf(0.5f * (1 + n[2])); /* the quaternion that rotates the z axis to the normal */
     sink_put_f32(out, half > 1e-3f ? half : 0);
     sink_put_f32(out, half > 1e-3f ? -0.5f * n[1] / half : 1);
     sink_put_f32(out, half > 1e-3f ? 0.5f * n[0] / half : 0);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* scenes/world.c -- rays into a world, its light and its colours. Shapes are in shapes.c. */
+/* scenes/world.c -- traces rays in a world, and computes light and colours. Shapes are in shapes.c. */
 #include "scenes/world.h"
 
 #include <math.h>
@@ -23,7 +23,7 @@ static void normalize(float a[3])
     }
 }
 
-/** Two unit vectors that make a right-handed frame with the unit vector n. */
+/** Two unit vectors that complete the unit vector n to a right-handed frame. */
 static void frame(const float n[3], float a[3], float b[3])
 {
     const float least[3] = {fabsf(n[0]) < 0.6f, fabsf(n[0]) < 0.6f ? 0.0f : 1.0f, 0};
@@ -60,7 +60,7 @@ bool world_trace(const world *w, const float origin[3], const float dir[3], surf
     if (dot(out->geometric, dir) > 0)
         for (int k = 0; k < 3; k++)
             out->geometric[k] = -out->geometric[k];
-    /* Shapes carry outward normals, whatever the winding of their triangles. */
+    /* Shapes have outward normals, whatever the winding of their triangles. */
     out->is_back = dot(out->normal, out->geometric) < 0;
     if (out->is_back)
         for (int k = 0; k < 3; k++)
@@ -81,9 +81,9 @@ static void sky_radiance(const world *w, const float dir[3], float out[3])
 }
 
 /**
- * Light of the lamp that arrives at a point, times the cosine at its normal; 0 in shadow.
+ * Light of the lamp that arrives at a point, times the cosine to its normal; 0 in shadow.
  *
- * @param to_lamp [out] unit direction to the point of the lamp that was tried
+ * @param to_lamp [out] unit direction to the sampled point of the lamp
  */
 static bool lamp_light(const world *w, const surface *s, const float jitter[2], float to_lamp[3],
                        float irradiance[3])
@@ -122,7 +122,7 @@ static bool lamp_light(const world *w, const surface *s, const float jitter[2], 
     return true;
 }
 
-/** Radiance of a surface towards -dir; mirror rays are followed only where `depth` is 0. */
+/** Radiance of a surface towards -dir. Mirror reflections are only followed if `depth` is 0. */
 static void radiance(const world *w, const surface *s, const float dir[3], const float jitter[2], int depth,
                      float out[3])
 {
@@ -188,14 +188,15 @@ void world_sky(const world *w, const float dir[3], float rgb[3])
     display(w, rgb);
 }
 
-/* One bounce is gathered; light that bounced more often is taken as this part of what the sky would give
-   without walls. */
+/* One bounce of indirect light is computed. Later bounces are approximated by this fraction of the sky's
+   light without any occlusion. */
 static const float later_bounces = 0.14f;
 
 typedef struct bake {
     const world *w;
     float *indirect;
-    unsigned char *is_buried; /* [vertex_count]: starts inside a solid, so what it gathered means nothing */
+    unsigned char *is_buried; /* [vertex_count]: the vertex is inside a solid, so the light gathered there is
+                                 meaningless */
     int rays;
 } bake;
 
@@ -221,8 +222,8 @@ static void bake_vertices(size_t block, size_t begin, size_t end, void *context)
         for (int k = 0; k < 3; k++)
             start[k] = w->position[3 * i + (size_t)k] + 4 * w->epsilon * n[k];
         for (int ray = 0; ray < job->rays; ray++) {
-            /* Cosine-distributed, so every ray weighs the same. The same set everywhere: no noise between
-               neighbours. */
+            /* Cosine-distributed directions have equal weights. All vertices use the same directions, so
+               there is no noise between neighbours. */
             const float u = ((float)ray + 0.5f) / (float)job->rays,
                         angle = 2 * pi * reversed_bits((uint32_t)ray);
             const float r = sqrtf(u), up = sqrtf(1 - u);
@@ -254,8 +255,8 @@ static void bake_vertices(size_t block, size_t begin, size_t end, void *context)
     }
 }
 
-/** Give buried vertices the mean of their neighbours, from the rim inwards: triangles that are only partly
-    covered then stay even. */
+/** Give vertices inside a solid the mean light of their neighbours, starting at the edge, so that partly
+    covered triangles are shaded evenly. */
 static void spread_light(const bake *job, float *sum, uint32_t *count)
 {
     const world *w = job->w;
@@ -303,7 +304,7 @@ gbt_status world_finish(world *w, int rays)
     } else {
         parallel_blocks(w->vertex_count, 64, bake_vertices, &job);
         spread_light(&job, sum, count);
-        /* Only now: the gathering itself must not see half of the answer. */
+        /* Set only now, because gathering must not use partial results. */
         w->indirect = job.indirect;
     }
     mem_free(job.is_buried);

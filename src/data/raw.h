@@ -45,8 +45,8 @@ typedef struct raw_scene {
     size_t missing_bytes, missing_capacity;
 } raw_scene;
 
-/** Larger coordinates are rejected: there, doubles cannot resolve a tenth of a millimetre, and squares of
-    sums overflow floats. */
+/** Larger coordinates are rejected: there a double no longer resolves a tenth of a millimetre, and squares in
+    float soon overflow. */
 #define RAW_COORDINATE_LIMIT 1e12
 
 enum { RAW_IMAGE_LIMIT = 65500, RAW_NAME_LIMIT = 4096 };

@@ -136,8 +136,7 @@ static void set_lens(const recipe *r, const gbt_make_scene_def *def, gbt_camera 
    the target and turns by some degrees: like a hand-held phone that does not stop for the photo. */
 static void roll(const gbt_make_scene_def *def, int view, double distance, gbt_camera *camera)
 {
-    static const double move = 0.02,
-                        turn = 0.02; /* standard deviations: fraction of the distance, and radians */
+    static const double move = 0.02, turn = 0.02; /* std-dev: fraction of the distance; radians */
     camera->shutter = GBT_CAMERA_SHUTTER_ROWS;
     for (int k = 0; k < 6; k++)
         camera->motion[k] = (k < 3 ? move * distance : turn) *

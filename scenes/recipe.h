@@ -17,8 +17,7 @@ typedef struct recipe {
     void (*build)(world *w); /* adds shapes, lamp and look; does not call world_finish() */
     recipe_ring rings[2];
     float target[3];
-    /* where camera `view` of `view_count` stands and what it looks at, instead of rings; NULL: rings are used
-     */
+    /* where camera `view` of `view_count` stands and what it looks at; NULL: on the rings */
     void (*stand)(int view, int view_count, double eye[3], double target[3]);
     float jitter;       /* standard deviation of eye and target, scene units */
     float focal_widths; /* focal length in image widths */

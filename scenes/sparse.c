@@ -29,8 +29,7 @@ static const double keep_share = 0.6;    /* fraction of the views of a point in 
 
 void sparse_choose(const image *photo, uint64_t seed, uint64_t view, size_t wanted, sparse_seed *out)
 {
-    /* Take the one of three random positions where the picture changes most; blank walls thus still get some.
-     */
+    /* Of three random positions take the one where the picture changes most; blank walls still get some. */
     for (size_t i = 0; i < wanted; i++) {
         float best = -1;
         for (uint64_t attempt = 0; attempt < 3; attempt++) {

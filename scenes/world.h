@@ -78,8 +78,7 @@ void world_place(world *w, float x, float y, float z, float turn_rad);
 void world_sheet(world *w, int material, int variant, const float corner[3], const float a[3],
                  const float b[3], float cell);
 
-/** Box with sides parallel to the axes; each face is a sheet. `cell` is the largest edge length of its cells.
- */
+/** Box with sides parallel to the axes; each face is a sheet. `cell` is the largest edge of a cell. */
 void world_box(world *w, int material, int variant, const float center[3], const float half[3], float cell);
 
 /**

@@ -135,8 +135,8 @@ static gbt_status write_cloud(const char *folder, const loaded_run *r, const gau
     GBT_TRY(file_join(place, sizeof place, folder, name, err));
     GBT_TRY(file_make_folder(place, err));
     GBT_TRY(file_join(path, sizeof path, place, "point_cloud.ply", err));
-    gaussian_cloud plain =
-        *cloud; /* without the mip comment, because the 3DGS viewer expects the count in the third line */
+    /* Without the mip comment: the 3DGS viewer expects the count in the third line. */
+    gaussian_cloud plain = *cloud;
     plain.antialiased = false;
     GBT_TRY(gaussian_file_write(path, &plain, r->model.origin, err));
     struct stat info = {0};

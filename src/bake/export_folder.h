@@ -11,8 +11,7 @@
 /** Whether an output is meant to be a result folder: its name ends in a slash. */
 bool export_folder_is(const char *path);
 
-/** GBT_ERR_ARGUMENT when the folder holds a later iteration than the run's, because readers use the last one.
- */
+/** GBT_ERR_ARGUMENT when the folder holds a later iteration than the run's: readers use the last one. */
 gbt_status export_folder_check(const char *folder, const loaded_run *r, gbt_error *err);
 
 /**

@@ -78,8 +78,7 @@ float gaussian_cloud_near(double said);
 /** Log one warning when rows were dropped or corrected: how many, and how. `name` is the file's. */
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name);
 
-/** Raise the smaller scales of one Gaussian to 1 / GAUSSIAN_SCALE_RATIO of the largest. True if one changed.
- */
+/** Raise the smaller scales of one Gaussian to 1 / GAUSSIAN_SCALE_RATIO of the largest. True if changed. */
 bool gaussian_limit_scales(float scale_log[3]);
 
 #endif

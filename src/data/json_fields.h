@@ -40,8 +40,7 @@ gbt_status json_field_needed(const json_fields *r, const char *field, const char
 /** Three numbers. When the field is missing, `out` keeps its value, or it is an error if `needed`. */
 gbt_status json_field_vector(const json_fields *r, const char *field, bool needed, double out[3]);
 
-/** A number in (low, high], or [low, high] when `closed`. When the field is missing, `out` keeps its value.
- */
+/** A number in (low, high], or [low, high] when `closed`. If the field is missing, `out` is unchanged. */
 gbt_status json_field_number(const json_fields *r, const char *field, double low, bool closed, double high,
                              double *out);
 gbt_status json_field_whole(const json_fields *r, const char *field, int low, int high, int *out); /* in [low,
@@ -52,8 +51,7 @@ gbt_status json_field_bool(const json_fields *r, const char *field, bool *out);
 gbt_status json_field_choice(const json_fields *r, const char *field, const char *const *choices, int count,
                              int *out);
 
-/** A required file name, called `what` in messages; relative to the JSON file's folder unless it is absolute.
- */
+/** A required file name, called `what` in messages; relative to the JSON file's folder unless absolute. */
 gbt_status json_field_file(const json_fields *r, const char *field, const char *what,
                            char out[JSON_PATH_SIZE]);
 

@@ -54,8 +54,7 @@ static float half_of_largest(const image *im)
     float largest = 0;
     for (size_t i = 0; i < (size_t)im->width * (size_t)im->height; i++)
         largest = fmaxf(largest, brightness(im->pixels + i * channels, channels));
-    return largest > 0 ? 0.5f * largest
-                       : 1; /* the mask is black everywhere: no pixel reaches 1, so none is valid */
+    return largest > 0 ? 0.5f * largest : 1; /* black everywhere: no pixel reaches 1, none is valid */
 }
 
 static gbt_status read_marks(const char *path, const image *photo, unsigned char **out, gbt_error *err)

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* data/photo_check.h -- checks all photos and masks of a scene by their headers, before any pixels are read.
- */
+/* data/photo_check.h -- checks all photos and masks of a scene by their headers, without reading pixels. */
 #ifndef GBT_DATA_PHOTO_CHECK_H
 #define GBT_DATA_PHOTO_CHECK_H
 

@@ -161,8 +161,7 @@ static void drop_repeated(raw_scene *raw, size_t *dropped)
     raw->view_count = kept;
 }
 
-/* Blender's synthetic scenes: `train` is transforms_train.json; the held-out views are in a file beside it.
- */
+/* Blender's synthetic scenes: `train` is transforms_train.json; held-out views are in a file beside it. */
 static gbt_status load_blender(const char *train, const char *folder, raw_scene *raw, gbt_error *err)
 {
     static const char *const held_out[] = {"transforms_test.json", "transforms_val.json"};
@@ -333,8 +332,7 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     out->points.color = raw->color;
     raw->color = NULL;
     if (out->points.color == NULL)
-        out->points.color =
-            mem_alloc(0, sizeof(float), "point colours", err); /* never NULL, even without points */
+        out->points.color = mem_alloc(0, sizeof(float), "point colours", err); /* never NULL */
     if (out->points.color == NULL)
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < raw->view_count; i++) {

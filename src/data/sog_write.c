@@ -13,10 +13,8 @@
 #include "data/sog.h"
 #include "data/webp.h"
 
-enum {
-    FILES_MAX = 8,
-    GAUSSIANS_PER_ENTRY = 4 /* for each palette entry, within 1,024 to SOG_PALETTE_MAX entries */
-};
+/* GAUSSIANS_PER_ENTRY: for each palette entry, within 1,024 to SOG_PALETTE_MAX entries. */
+enum { FILES_MAX = 8, GAUSSIANS_PER_ENTRY = 4 };
 
 typedef struct writing {
     const gaussian_cloud *cloud;
@@ -108,8 +106,7 @@ static gbt_status put_positions(writing *w)
 
 /* ---- rotations ---- */
 
-/* Smallest-three encoding: the component of w x y z with the largest magnitude is made positive and dropped.
- */
+/* Smallest-three encoding: of w x y z the component largest in magnitude is made positive and dropped. */
 static gbt_status put_rotations(writing *w)
 {
     GBT_TRY(open_pixels(w));

@@ -105,8 +105,7 @@ static gbt_status find_kind(const transforms_frame *s, lens_kind *kind, bool *is
 
 enum { K1, K2, K3, K4, P1, P2, LENS_COUNT };
 
-/* Read k1 k2 k3 k4 p1 p2 from their own keys or, in this order, from distortion_params; missing ones are 0.
- */
+/* Read k1 k2 k3 k4 p1 p2 from their own keys or, in this order, from distortion_params; default 0. */
 static gbt_status find_distortion(const transforms_frame *s, double lens[LENS_COUNT], bool *any,
                                   gbt_error *err)
 {

@@ -231,8 +231,7 @@ static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
     return fail(r, "the text ends inside the prim", err);
 }
 
-/* Advance to behind the opening brace of the first prim of Gaussians. `depth`: the number of its ancestors.
- */
+/* Advance to behind the opening brace of the first prim of Gaussians. `depth`: how many ancestors it has. */
 static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
 {
     token t;

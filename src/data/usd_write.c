@@ -103,8 +103,7 @@ static gbt_status put_text(sink *s, const gaussian_cloud *cloud, const double or
     return s->status;
 }
 
-/* Write a .usda or .usdz; `origin` becomes the prim's translation. GBT_ERR_ARGUMENT for a .usdz beyond 4 GiB.
- */
+/* Write a .usda or .usdz; `origin` becomes the prim's translation. GBT_ERR_ARGUMENT: a .usdz above 4 GiB. */
 static gbt_status write_usd(const char *path, const gaussian_cloud *cloud, const double origin[3],
                             bool packaged, gbt_error *err)
 {

@@ -131,8 +131,7 @@ gbt_status container_encode(const container_writer *w, unsigned char **bytes, si
     if (head == NULL)
         return GBT_ERR_NO_MEMORY;
     const container_row *rows = (const container_row *)(const void *)(head + 1);
-    unsigned char *file =
-        mem_calloc(head->file_bytes, 1, "file image", err); /* zeroed: the gaps between sections must be 0 */
+    unsigned char *file = mem_calloc(head->file_bytes, 1, "file image", err); /* gaps must be 0 */
     if (file != NULL) {
         memcpy(file, head, head_bytes);
         for (size_t i = 0; i < w->count; i++)

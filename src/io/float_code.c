@@ -10,8 +10,8 @@ enum { BYTE_VALUES = 256 };
 
 gbt_status floats_code(range_coder *c, float *values, size_t rows, size_t columns, gbt_error *err)
 {
-    const size_t trees =
-        columns + BYTE_VALUES; /* contexts of the first byte: the column; of the second: the first byte */
+    /* The context of the first byte is the column, that of the second byte is the first byte. */
+    const size_t trees = columns + BYTE_VALUES;
     coder_bit_model(*tree)[BYTE_VALUES] = mem_alloc(trees, sizeof *tree, "float contexts", err);
     if (tree == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -142,8 +142,7 @@ static bool same_parts(const model *a, const model *b)
            memcmp(a->anchor_pixel, b->anchor_pixel, n * sizeof(float)) == 0;
 }
 
-/* Read back the bytes that are about to be written: a model that cannot be read must not replace a good file.
- */
+/* Read back the bytes before they are written: an unreadable model must not replace a good file. */
 static gbt_status check_bytes(const char *path, const unsigned char *bytes, size_t byte_count,
                               const model *wanted, gbt_error *err)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_steps.c -- measures the sensitivity of pictures to each parameter, and derives quantization steps.
- */
+/* io/model_steps.c -- measures how sensitive pictures are to each parameter; derives quantization steps. */
 #include "io/model_steps.h"
 
 #include <math.h>

@@ -47,8 +47,8 @@ position_grid position_grid_over(const float *position, size_t count, double cel
         side = fmax(side, (double)high[k] - (double)grid.origin[k]);
     while (grid.levels < POSITION_LEVELS_MAX && side > cell_wanted * ldexp(1, grid.levels))
         grid.levels++;
-    const double least =
-        side / ldexp(1, grid.levels) * (1 + 1e-6); /* max(): cells are not made smaller than wanted */
+    /* Cells are not made smaller than wanted, even if the box allows it. */
+    const double least = side / ldexp(1, grid.levels) * (1 + 1e-6);
     grid.cell = (float)fmin(fmax(fmax(least, cell_wanted), 1e-37), 1e38);
     return grid;
 }

@@ -138,8 +138,8 @@ void coder_read_start(range_coder *c, const unsigned char *bytes, size_t size)
 
 gbt_status coder_write_end(range_coder *c, gbt_error *err)
 {
-    c->low = (c->low + RENORM - 1) & ~(uint64_t)(RENORM - 1); /* rounded up within [low, low + range) so that
-                                                                 it ends in three zero bytes */
+    /* Rounded up, but still within [low, low + range), so that it ends in three zero bytes. */
+    c->low = (c->low + RENORM - 1) & ~(uint64_t)(RENORM - 1);
     for (int i = 0; i < 5; i++)
         shift_low(c);
     if (c->status != GBT_OK)

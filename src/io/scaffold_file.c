@@ -27,8 +27,7 @@ typedef struct anchor_rows {
     size_t column_count, dropped;
 } anchor_rows;
 
-/* The columns are position, features, log-scales and offsets; of the offsets all x, then all y, then all z.
- */
+/* The columns are position, features, log-scales and offsets (first all x, then all y, then all z). */
 static void add_row(void *context, const double *values)
 {
     anchor_rows *rows = context;

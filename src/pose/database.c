@@ -70,8 +70,7 @@ gbt_status database_find(database *d, const char *name, database_photo *out, gbt
     return code == SQLITE_ROW || code == SQLITE_DONE ? GBT_OK : failed(d, err);
 }
 
-/* Add the result of a count. A missing table or column counts as 0, because it depends on COLMAP's version.
- */
+/* Add the result of a count. A missing table or column (it depends on COLMAP's version) counts as 0. */
 static gbt_status add_count(database *d, const char *query, size_t *count, gbt_error *err)
 {
     sqlite3_stmt *statement;

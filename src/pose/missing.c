@@ -20,8 +20,7 @@ enum {
     FEW_FEATURES = 200
 };
 
-static const double blurred =
-    0.3; /* fraction of the usual sharpness; blurring twice as much leaves a quarter or less */
+static const double blurred = 0.3; /* of the usual sharpness; twice the blur leaves 1/4 or less */
 
 typedef struct facts {
     int64_t features, matches;  /* number of matches, over all pairs, that are consistent with one geometry */

@@ -166,8 +166,7 @@ gbt_status check_spec(const char *path, const char *plugin, opened_image *o, gbt
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: image of %d x %d x %d pixels and %d channels (wanted at least 1 x 1 x 1 and 1)",
                          path, spec.width, spec.height, spec.depth, spec.nchannels);
-    /* No product exceeds 2^62: each factor is a positive int, and the first two are checked before the third.
-     */
+    /* No product exceeds 2^62: each factor is a positive int; the first two are checked before the third. */
     const int64_t pixels = int64_t(spec.width) * spec.height,
                   tile = int64_t(spec.tile_width) * spec.tile_height;
     if (pixels > max_samples || pixels * spec.nchannels > max_samples || tile > max_samples ||

@@ -48,8 +48,8 @@ static void *work(void *argument)
     fenv_t saved; /* every thread gets the same floating-point environment, whatever a library has set */
     fegetenv(&saved);
     fesetenv(FE_DFL_ENV);
-    inside +=
-        j->blocks > 1; /* a single block does not count as nesting: calls inside it may use the threads */
+    /* A single block does not count as nesting: calls inside it may use the threads. */
+    inside += j->blocks > 1;
     for (;;) {
         const size_t block = atomic_fetch_add(&j->next, 1);
         if (block >= j->blocks)

@@ -43,8 +43,8 @@ gbt_status json_field_vector(const json_fields *r, const char *field, bool neede
 /** A number in (low, high], or [low, high] when `closed`. If the field is missing, `out` is unchanged. */
 gbt_status json_field_number(const json_fields *r, const char *field, double low, bool closed, double high,
                              double *out);
-gbt_status json_field_whole(const json_fields *r, const char *field, int low, int high, int *out); /* in [low,
-                                                                                                      high] */
+/** A whole number in [low, high]. If the field is missing, `out` is unchanged. */
+gbt_status json_field_whole(const json_fields *r, const char *field, int low, int high, int *out);
 gbt_status json_field_bool(const json_fields *r, const char *field, bool *out);
 
 /** The index of the field's text in `choices`; 0 when the field is missing. */

@@ -51,7 +51,7 @@ typedef struct scene {
     size_t view_count;
     scene_view *views; /* sorted by name (bytes); those of a cameras.json in file order */
     scene_points points;
-    size_t points_dropped;   /* non-finite ones */
+    size_t points_dropped;   /* not finite, or beyond RAW_COORDINATE_LIMIT */
     size_t photos_missing;   /* views left out because their photo is missing */
     size_t file_bytes;       /* total size of the data set's files, without photos */
     char missing_names[256]; /* the first of those views */

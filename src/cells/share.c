@@ -16,12 +16,15 @@ typedef struct share_walk {
 } share_walk;
 
 /* Visits the chunks from the eye on. A chunk belongs to the share whose part of the summed weights holds the
-   sum over the chunks in front of it. */
+   sum over the chunks in front of it. The last share also has the chunks of weight 0 behind all others, which
+   are out of view: Gaussians of nearer chunks may reach into them. */
 static void walk_part(share_walk *w, const cell_part *part)
 {
     cell_drawer *d = w->d;
     if (cell_is_chunk(d->store, part)) {
-        const size_t of = w->total > 0 ? w->before * (size_t)d->share.count / w->total : 0;
+        const size_t count = (size_t)d->share.count, last = count - 1,
+                     wanted = w->total > 0 ? w->before * count / w->total : 0,
+                     of = wanted < last ? wanted : last;
         w->before += w->weight[part->node - (d->store->chunk_count - 1)];
         d->first += of < (size_t)d->share.index;
         d->end += of <= (size_t)d->share.index;

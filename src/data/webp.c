@@ -28,7 +28,12 @@ gbt_status webp_put(sink *out, const webp_table *table, gbt_error *err)
     if (WebPPictureImportRGBA(&picture, table->bytes, 4 * table->width) && WebPEncode(&config, &picture))
         sink_put(out, writer.mem, writer.size);
     else
-        base_fail(err, out->status = GBT_ERR_NO_MEMORY, "libwebp: error %d", (int)picture.error_code);
+        base_fail(err,
+                  out->status = picture.error_code == VP8_ENC_ERROR_OUT_OF_MEMORY ||
+                                        picture.error_code == VP8_ENC_ERROR_BITSTREAM_OUT_OF_MEMORY
+                                    ? GBT_ERR_NO_MEMORY
+                                    : GBT_ERR_INTERNAL,
+                  "libwebp: error %d", (int)picture.error_code);
     WebPPictureFree(&picture);
     WebPMemoryWriterClear(&writer);
     return out->status;

@@ -156,7 +156,7 @@ static void add_axis_tick(text *out, const plot_axis *a, int i)
 /* Whether a tick lies outside the axis, which can be where the axis ends with the values. */
 static bool is_outside(const plot_axis *a, double tick)
 {
-    return tick < a->low - 1e-9 * fabs(a->low) || tick > a->high * (1 + 1e-9);
+    return tick < a->low - 1e-9 * fabs(a->low) || tick > a->high + 1e-9 * fabs(a->high);
 }
 
 static void draw_grid(text *out, const plot *p)

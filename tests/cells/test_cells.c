@@ -440,6 +440,27 @@ static void check_shares(gaussian_cloud *cloud, bool ends)
     close_both(&b);
 }
 
+/* Chunks that are out of view weigh nothing, the farthest ones, too; they still belong to a share, for
+   Gaussians of nearer chunks reach into them. */
+static void the_last_chunks_are_out_of_view(void **state)
+{
+    (void)state;
+    both b;
+    gaussian_cloud cloud;
+    size_t again;
+    random_cloud(&cloud, 3000);
+    open_both(&b, &cloud);
+    gbt_camera camera = camera_at(0.3, 0.4, 0.5); /* amid the cloud, so half of it is behind */
+    for (int i = 0; i < 2; i++) {
+        const ray_shot shot = ray_shot_of(&camera);
+        assert_true(difference_of_shares(&b, &shot, 3, &again) <= rounding);
+        for (int k = 0; k < 3; k++) /* to the other side */
+            for (int row = 0; row < 3; row += 2)
+                camera.rotation[3 * row + k] = -camera.rotation[3 * row + k];
+    }
+    close_both(&b);
+}
+
 static void shares_make_the_picture(void **state)
 {
     (void)state;
@@ -603,6 +624,7 @@ int main(void)
         cmocka_unit_test(nothing_in_view),
         cmocka_unit_test(shares_make_the_picture),
         cmocka_unit_test(rays_that_end_in_a_share),
+        cmocka_unit_test(the_last_chunks_are_out_of_view),
         cmocka_unit_test(threads_give_the_same_bits),
         cmocka_unit_test(what_cannot_be_drawn),
         cmocka_unit_test(files_that_cannot_be_sorted),

@@ -3,7 +3,6 @@
 #include "scenes/photo.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/parallel.h"
 #include "base/rng.h"

@@ -3,7 +3,6 @@
 #include "scenes/sparse.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/camera_pose.h"

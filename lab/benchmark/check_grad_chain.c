@@ -8,7 +8,6 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "benchmark/check_grad.h"
-#include "image/metrics.h"
 
 enum { ANCHOR_GRAIN = 256, DIRECTIONS = 3, ATTEMPTS = 24 };
 

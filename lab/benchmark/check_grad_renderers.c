@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/check_grad_renderers.c -- compare the adjoints of the renderers with double-precision versions.
  */
-#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"

@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* stability/scene.c -- read the scene files of the study "stability", and collect the results of the cases.
  */
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "base/fail.h"
 #include "base/file.h"
-#include "base/log.h"
 #include "stability/stability.h"
 
 bool stability_ok(stability *s, gbt_status status)

@@ -2,13 +2,11 @@
 /* stability/training.c -- cases of the study "stability" about training: views far from the photos (A12), and
    poor sparse points or photos (A13). */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "anchor/decode_layout.h"
 #include "base/compare.h"
 #include "base/memory.h"
-#include "base/rng.h"
 #include "base/vec.h"
 #include "image/metrics.h"
 #include "stability/practice.h"

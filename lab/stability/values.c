@@ -2,10 +2,8 @@
 /* stability/values.c -- cases of the study "stability" about values: saturated stacks and their gradients
    (A7), and non-finite values (A8). */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
-#include "base/memory.h"
 #include "base/rng.h"
 #include "stability/gradient.h"
 #include "stability/model.h"

@@ -4,7 +4,6 @@
 
 #include <stdio.h>
 
-#include "base/choice.h"
 #include "base/fail.h"
 
 enum { LEAST_ITERATIONS = 20 };

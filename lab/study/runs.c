@@ -21,7 +21,6 @@
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"
 #include "run/loaded_run.h"
-#include "study/runs_stat.h"
 
 enum { PATH_SIZE = 4096, SETTINGS_SIZE = CONFIG_TEXT_SIZE + PATH_SIZE };
 

@@ -2,7 +2,6 @@
 /* study/time_write.c -- the study "time" as tables, JSON and charts. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "data/json_out.h"
 #include "study/chart.h"

@@ -2,7 +2,6 @@
 /* base/paged.c -- large arrays in unnamed files. */
 #include "base/paged.h"
 
-#include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <stdatomic.h>

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_query.c -- gbtrace query. */
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

@@ -5,9 +5,7 @@
    command line is read twice: first for the common options, which include --config, then in full. */
 #include "cli/options.h"
 
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "cli/progress.h"

@@ -2,7 +2,6 @@
 /* command/info.c -- describe the contents of a data set or a model, for a person or as JSON. */
 #include "gbtrace/info.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -2,8 +2,6 @@
 /* data/colmap_txt.c -- COLMAP's cameras.txt, images.txt and points3D.txt from bytes. */
 #include "data/colmap_txt.h"
 
-#include <math.h>
-
 #include "base/camera_model.h"
 #include "base/paged.h"
 #include "data/number.h"

@@ -2,8 +2,6 @@
 /* data/colmap_write.c -- writes binary COLMAP models. */
 #include "data/colmap_write.h"
 
-#include <math.h>
-
 #include "base/file.h"
 #include "base/vec.h"
 #include "data/bytes.h"

@@ -9,7 +9,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/file.h"
 #include "data/gaussian_order.h"
 #include "data/gaussian_ply.h"
 

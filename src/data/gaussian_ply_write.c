@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "base/file.h"
 #include "data/compressed_ply.h"
 #include "data/gaussian_formats.h"
 #include "data/gaussian_ply.h"

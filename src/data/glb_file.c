@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "base/file.h"
 #include "data/gaussian_formats.h"
 #include "data/glb.h"
 

@@ -3,7 +3,6 @@
 #include "data/mask.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"

@@ -6,7 +6,6 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "base/memory.h"
 
 /* The input pixels that output pixel i of `out_count` covers, and how much of each. Edges are integers in

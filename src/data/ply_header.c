@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* data/ply_header.c -- parses the header of a PLY file. */
-#include <stdlib.h>
 
 #include "data/number.h"
 #include "data/ply.h"

@@ -2,7 +2,6 @@
 /* data/ply_write.c -- writes point clouds and triangle meshes as binary little-endian PLY. */
 #include <stdio.h>
 
-#include "base/file.h"
 #include "data/ply.h"
 
 static bool is_word(const char *text)

@@ -9,7 +9,6 @@
 #include "base/file.h"
 #include "base/image.h"
 #include "base/image_header.h"
-#include "base/memory.h"
 #include "data/scene.h"
 
 enum { PATH_SIZE = RAW_NAME_LIMIT + 4096 };

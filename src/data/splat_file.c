@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/file.h"
 #include "data/gaussian_formats.h"
 
 enum { ROW_BYTES = 32 };

@@ -2,10 +2,8 @@
 /* frame/plain_view.c -- adjoint of the spherical harmonics with respect to means and eye. */
 #include "frame/plain_view.h"
 
-#include <math.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"

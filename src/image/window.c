@@ -6,7 +6,6 @@
    checks between this many arrays. */
 #include "image/window.h"
 
-#include <math.h>
 #include <stdbool.h>
 
 #include "base/cpu.h"

@@ -3,7 +3,6 @@
 #include "io/attribute_code.h"
 
 #include <stdbool.h>
-#include <string.h>
 
 #include "base/memory.h"
 #include "io/position_code.h"

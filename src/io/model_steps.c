@@ -3,7 +3,6 @@
 #include "io/model_steps.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "anchor/decode.h"
 #include "base/fail.h"

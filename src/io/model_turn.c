@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* io/model_turn.c -- transforms the features of a model to the basis that codes best, and its networks
    accordingly. */
-#include <math.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "base/memory.h"
 #include "base/symmetric.h"
 #include "io/model_steps.h"

@@ -3,7 +3,6 @@
 #include "io/position_code.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/memory.h"
 #include "base/morton.h"

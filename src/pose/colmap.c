@@ -14,7 +14,6 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/log.h"
-#include "base/memory.h"
 #include "base/parallel.h"
 #include "data/bytes.h"
 #include "pose/child.h"

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "base/fail.h"
 #include "base/memory.h"
 #include "data/photo_size.h"
 

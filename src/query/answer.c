@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* query/answer.c -- queries of a file, answered as CSV. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/def.h"

@@ -11,7 +11,6 @@
 #include <string.h>
 
 #include "base/camera_model.h"
-#include "base/camera_pose.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/memory.h"

@@ -7,7 +7,6 @@
 #include "render/ellipsoids.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"

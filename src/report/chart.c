@@ -2,7 +2,6 @@
 /* report/chart.c -- line charts as inline SVG. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "report/chart.h"
 #include "report/plot.h"

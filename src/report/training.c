@@ -3,12 +3,10 @@
 #include "report/training.h"
 
 #include <math.h>
-#include <stdio.h>
 
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "gbtrace/train.h"
 #include "report/chart.h"
 #include "report/log.h"
 #include "report/metrics.h"

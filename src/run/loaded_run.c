@@ -17,7 +17,6 @@
 #include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 #include "data/result_folder.h"
-#include "train/camera_sees.h"
 #include "train/near_distance.h"
 #include "train/pose_file.h"
 #include "train/rules.h"

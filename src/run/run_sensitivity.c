@@ -3,8 +3,6 @@
    views. */
 #include "run/run_sensitivity.h"
 
-#include <string.h>
-
 #include "base/fail.h"
 #include "base/memory.h"
 #include "base/rng.h"

@@ -3,7 +3,6 @@
    the rotation it gives a torque about the camera's centre. */
 #include "trace/pose_gradient.h"
 
-#include "base/fail.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"

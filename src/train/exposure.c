@@ -6,7 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "base/memory.h"
 #include "data/json_out.h"
 #include "train/adam.h"

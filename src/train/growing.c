@@ -4,7 +4,6 @@
 #include "train/growing.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/fail.h"
 #include "base/log.h"

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/run.c -- a whole training run: the loop around the steps, its folder, its clock, its signals. */
-#include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"

@@ -3,8 +3,6 @@
    to all. */
 #include "train/step_exchange.h"
 
-#include <string.h>
-
 #include "base/fail.h"
 #include "cluster/cluster.h"
 

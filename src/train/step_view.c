@@ -10,7 +10,6 @@
 #include "base/clock.h"
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "base/rng.h"
 #include "train/gradient_check.h"
 #include "train/growing.h"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/base/test_sky.c -- colours by direction: sixteen at a time, one, and in double; cut, and constant. */
 #include <math.h>
-#include <string.h>
 
 #include "base/rng.h"
 #include "base/sky.h"

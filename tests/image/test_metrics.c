@@ -7,7 +7,6 @@
 #include "base/image.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "base/rng.h"
 #include "image/metrics.h"
 #include "image_support.h"
 

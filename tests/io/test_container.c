@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/io/test_container.c -- the container: what goes in comes out, and nothing damaged does. */
-#include <fcntl.h>
 #include <sys/mount.h>
 
 #include "folder.h"

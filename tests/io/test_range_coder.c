@@ -3,7 +3,6 @@
    are read without harm. */
 #include <math.h>
 
-#include "base/memory.h"
 #include "base/rng.h"
 #include "io/float_code.h"
 #include "io/half.h"

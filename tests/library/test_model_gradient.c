@@ -8,7 +8,6 @@
 
 #include <unistd.h>
 
-#include "base/parallel.h"
 #include "base/rng.h"
 #include "gbtrace/model.h"
 #include "gbtrace/train.h"

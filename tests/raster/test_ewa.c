@@ -2,7 +2,6 @@
 /* tests/raster/test_ewa.c -- the EWA form and its adjoint against the double reference, and the reference
    against differences. */
 #include "base/near.h"
-#include "base/parallel.h"
 #include "reference/raster_ref.h"
 #include "raster/raster_support.h"
 

@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/camera_pose.h"
 #include "base/near.h"
 #include "base/vec.h"
 #include "folder.h"

@@ -4,7 +4,6 @@
 #include <ctype.h>
 #include <jansson.h>
 
-#include "base/camera_pose.h"
 #include "base/image.h"
 #include "base/rng.h"
 #include "folder.h"

@@ -3,7 +3,6 @@
    colour, surfaces, radius, memory. */
 #include "base/memory.h"
 #include "base/near.h"
-#include "base/parallel.h"
 #include "base/rng.h"
 #include "base/vec.h"
 #include "test_support.h"

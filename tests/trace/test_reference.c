@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/trace/test_reference.c -- the double reference against closed forms and central differences, and the
    rays that feed it. */
-#include "base/fail.h"
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"

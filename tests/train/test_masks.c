@@ -5,7 +5,6 @@
 
 #include <jansson.h>
 
-#include "data/photo_size.h"
 #include "gbtrace/evaluate.h"
 #include "io/model_file.h"
 #include "quiet.h"

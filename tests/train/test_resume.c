@@ -5,13 +5,11 @@
 
 #include <jansson.h>
 
-#include "base/log.h"
 #include "base/parallel.h"
 #include "io/container.h"
 #include "io/model_file.h"
 #include "quiet.h"
 #include "train/checkpoint.h"
-#include "train/config.h"
 
 static gbt_train_def resume_def(uint64_t iterations, double budget_seconds)
 {

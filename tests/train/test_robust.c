@@ -18,7 +18,6 @@
 #include "run/loaded_run.h"
 #include "train/camera_sees.h"
 #include "train/checkpoint.h"
-#include "train/config.h"
 #include "train/gradient_check.h"
 #include "train/run_log.h"
 #include "train/schedule.h"

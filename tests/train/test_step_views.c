@@ -3,7 +3,6 @@
    of their statistics, the same bits for every number of threads. */
 #include "run_support.h"
 
-#include "base/parallel.h"
 #include "gbtrace/train.h"
 #include "train/adam.h"
 #include "train/growing.h"

@@ -16,7 +16,6 @@
 #include "base/compare.h"
 #include "base/cpu.h"
 #include "base/image.h"
-#include "base/log.h"
 #include "base/paged.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -30,7 +29,6 @@
 #include "train/config.h"
 #include "train/save.h"
 #include "train/seed_points.h"
-#include "train/setup_data.h"
 #include "train/step_pixels.h"
 
 /* The run that others are compared with: STEPS steps in one go. */

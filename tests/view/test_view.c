@@ -4,7 +4,6 @@
 #include "train/run_support.h"
 #include "view/http_client.h"
 
-#include <fcntl.h>
 #include <jansson.h>
 #include <math.h>
 #include <pthread.h>

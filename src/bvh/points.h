@@ -146,20 +146,17 @@ typedef struct point_lists {
     size_t count;
     size_t *first; /* [count + 1] */
     uint32_t *index;
-    double *value; /* of each answer: |c - a|; for POINTS_CROSSED the t of the point that is nearest to c.
-                      NULL when not wanted */
+    double *value; /* of each answer: |c - a|; for POINTS_CROSSED the t of the point that is nearest to c */
 } point_lists;
-void point_lists_free(point_lists *lists);
 
 /**
  * point_tree_list() for many queries.
  *
- * @param values [in] whether out->value is wanted
- * @param out    [out] free with point_lists_free(); zeroed on failure
+ * @param out [out] its arrays are the caller's: mem_free(); zeroed on failure
  * @return as point_tree_list(); names the first bad query
  */
-gbt_status point_tree_list_all(const point_tree *tree, const point_queries *queries, bool values,
-                               point_lists *out, gbt_error *err);
+gbt_status point_tree_list_all(const point_tree *tree, const point_queries *queries, point_lists *out,
+                               gbt_error *err);
 
 /**
  * For every point: root of the mean of the squared distances to its k nearest others (fewer when there are

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* bvh/points_batch.c -- many queries at once: blocks of queries on all threads, and within a block in Morton
    order, so that a query finds in the caches what the one before has read. */
-#include <stdatomic.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -212,7 +211,6 @@ typedef struct answer_block {
 typedef struct list_job {
     const point_tree *tree;
     const point_queries *queries;
-    bool values;
     size_t *first; /* [count + 1]: begins as the number of answers of query i at i + 1 */
     size_t *from;  /* [count]: where the answers of a query are in its block */
     answer_block *blocks;
@@ -246,14 +244,12 @@ static gbt_status keep(const list_job *job, answer_block *b, const point_list *l
     gbt_error *err = &b->failure.error;
     GBT_TRY(mem_reserve((void **)&b->index, &b->index_capacity, b->count, b->count + list->count,
                         sizeof *b->index, "points.answers", err));
-    if (job->values)
-        GBT_TRY(mem_reserve((void **)&b->value, &b->value_capacity, b->count, b->count + list->count,
-                            sizeof *b->value, "points.answers", err));
+    GBT_TRY(mem_reserve((void **)&b->value, &b->value_capacity, b->count, b->count + list->count,
+                        sizeof *b->value, "points.answers", err));
     const bool ray = job->queries->what == POINTS_CROSSED;
     for (size_t i = 0; i < list->count; i++) {
         b->index[b->count + i] = point_list_index(list, i);
-        if (job->values)
-            b->value[b->count + i] = ray ? point_list_value(list, i) : sqrt(point_list_value(list, i));
+        b->value[b->count + i] = ray ? point_list_value(list, i) : sqrt(point_list_value(list, i));
     }
     b->count += list->count;
     return GBT_OK;
@@ -298,8 +294,7 @@ static void copy_block(size_t block, size_t begin, size_t end, void *context)
         if (count == 0)
             continue;
         memcpy(job->out->index + to, b->index + job->from[i], count * sizeof *b->index);
-        if (job->values)
-            memcpy(job->out->value + to, b->value + job->from[i], count * sizeof *b->value);
+        memcpy(job->out->value + to, b->value + job->from[i], count * sizeof *b->value);
     }
 }
 
@@ -312,16 +307,15 @@ static gbt_status gather(list_job *job, size_t blocks, gbt_error *err)
         job->first[i + 1] += job->first[i];
     point_lists *out = job->out;
     out->index = mem_alloc(job->first[count], sizeof *out->index, "points.answers", err);
-    if (job->values)
-        out->value = mem_alloc(job->first[count], sizeof *out->value, "points.answers", err);
-    if (out->index == NULL || (job->values && out->value == NULL))
+    out->value = mem_alloc(job->first[count], sizeof *out->value, "points.answers", err);
+    if (out->index == NULL || out->value == NULL)
         return GBT_ERR_NO_MEMORY;
     parallel_blocks(count, job->grain, copy_block, job);
     return GBT_OK;
 }
 
-gbt_status point_tree_list_all(const point_tree *tree, const point_queries *queries, bool values,
-                               point_lists *out, gbt_error *err)
+gbt_status point_tree_list_all(const point_tree *tree, const point_queries *queries, point_lists *out,
+                               gbt_error *err)
 {
     const size_t count = queries->count, grain = grain_of(count), blocks = parallel_block_count(count, grain);
     *out = (point_lists){.count = count};
@@ -332,7 +326,6 @@ gbt_status point_tree_list_all(const point_tree *tree, const point_queries *quer
     if (out->first != NULL && from != NULL && block != NULL) {
         list_job job = {.tree = tree,
                         .queries = queries,
-                        .values = values,
                         .first = out->first,
                         .from = from,
                         .blocks = block,
@@ -347,15 +340,11 @@ gbt_status point_tree_list_all(const point_tree *tree, const point_queries *quer
     }
     mem_free(block);
     mem_free(from);
-    if (status != GBT_OK)
-        point_lists_free(out);
+    if (status != GBT_OK) {
+        mem_free(out->first);
+        mem_free(out->index);
+        mem_free(out->value);
+        *out = (point_lists){0};
+    }
     return status;
-}
-
-void point_lists_free(point_lists *lists)
-{
-    mem_free(lists->first);
-    mem_free(lists->index);
-    mem_free(lists->value);
-    *lists = (point_lists){0};
 }

@@ -34,7 +34,7 @@ static gbt_status ask(const gbt_balls *b, const point_queries *queries, gbt_answ
 {
     gbt_answers_free(out);
     point_lists lists;
-    GBT_TRY(point_tree_list_all(b->tree, queries, true, &lists, err));
+    GBT_TRY(point_tree_list_all(b->tree, queries, &lists, err));
     *out =
         (gbt_answers){.count = lists.count, .first = lists.first, .index = lists.index, .value = lists.value};
     return GBT_OK;

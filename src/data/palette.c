@@ -189,9 +189,10 @@ static bool goes_before(const cell *a, const cell *b)
     return a->error > b->error || (!(a->error < b->error) && a->begin < b->begin);
 }
 
-static void sink_down(cutting *c, size_t at)
+/* The first cell of the heap, to where it belongs. */
+static void sink_down(cutting *c)
 {
-    for (size_t child; (child = 2 * at + 1) < c->count; at = child) {
+    for (size_t at = 0, child; (child = 2 * at + 1) < c->count; at = child) {
         if (child + 1 < c->count && goes_before(&c->heap[child + 1], &c->heap[child]))
             child++;
         if (!goes_before(&c->heap[child], &c->heap[at]))
@@ -228,13 +229,13 @@ static void cut_cells(cutting *c, size_t count, size_t limit)
         low.end = high.begin = divide(c, &c->heap[0]);
         if (low.end == low.begin || high.end == high.begin) { /* the vectors do not differ measurably */
             c->heap[0].error = 0;
-            sink_down(c, 0);
+            sink_down(c);
             continue;
         }
         measure(c, &low);
         measure(c, &high);
         c->heap[0] = low;
-        sink_down(c, 0);
+        sink_down(c);
         push(c, &high);
     }
     qsort(c->heap, c->count, sizeof *c->heap, by_begin);

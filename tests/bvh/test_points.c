@@ -11,6 +11,7 @@
 #include <flann/flann.h>
 #endif
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -883,12 +884,6 @@ static void same_answers_for_any_threads(void **state)
 
 /* ---- real points ---- */
 
-static int compare_float(const void *a, const void *b)
-{
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
-}
-
 static void garden(void **state)
 {
     (void)state;
@@ -933,7 +928,7 @@ static void garden(void **state)
                 best = fmin(best, brute_distance_squared(position + 3 * i, position + 3 * j));
         assert_true(spacing[i] == (float)sqrt(best));
     }
-    qsort(spacing, COUNT, sizeof *spacing, compare_float);
+    qsort(spacing, COUNT, sizeof *spacing, compare_floats);
     assert_float_equal(spacing[COUNT / 2], 0.0052808, 1e-7); /* as another tool reported it */
     point_tree_free(tree);
     mem_free(position);

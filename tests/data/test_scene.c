@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include "base/compare.h"
 #include "base/rng.h"
 #include "base/vec.h"
 #include "colmap_text.h"
@@ -577,12 +578,6 @@ static void transforms_folder(void **state)
 }
 
 /* The origin against a sort, over sizes and values that stress the radix selection. */
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void origin_is_the_median(void **state)
 {
     (void)state;
@@ -606,7 +601,7 @@ static void origin_is_the_median(void **state)
         for (size_t k = 0; k < 3; k++) {
             for (size_t i = 0; i < count; i++)
                 sorted[i] = (double)position[3 * i + k];
-            qsort(sorted, count, sizeof *sorted, by_value);
+            qsort(sorted, count, sizeof *sorted, compare_doubles);
             if (s.origin[k] != sorted[(count - 1) / 2])
                 fail_msg("seed %llu: axis %zu: %g, wanted %g", (unsigned long long)seed, k, s.origin[k],
                          sorted[(count - 1) / 2]);

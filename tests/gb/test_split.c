@@ -1,13 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/gb/test_split.c -- rank selection, principal axes, and the cut at the median. */
+#include "base/compare.h"
 #include "clouds.h"
 #include "gb/split.h"
-
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* Shapes that defeat careless quickselects: sorted, reversed, organ pipe, few values, all equal, saw,
    random. */
@@ -37,14 +32,14 @@ static void check_select(size_t n, int shape, size_t rank)
     assert_true(keys != NULL && sorted != NULL);
     for (size_t i = 0; i < n; i++)
         sorted[i] = keys[i] = shaped(shape, i, n, 5);
-    qsort(sorted, n, sizeof *sorted, by_value);
+    qsort(sorted, n, sizeof *sorted, compare_doubles);
     const double got = split_select(keys, n, rank);
     if (got != sorted[rank])
         fail_msg("n %zu shape %d rank %zu: wanted %g, got %g", n, shape, rank, sorted[rank], got);
     assert_true(keys[rank] == got);
     for (size_t i = 0; i < n; i++)
         assert_true(i < rank ? keys[i] <= got : keys[i] >= got);
-    qsort(keys, n, sizeof *keys, by_value); /* nothing lost, nothing doubled */
+    qsort(keys, n, sizeof *keys, compare_doubles); /* nothing lost, nothing doubled */
     assert_memory_equal(keys, sorted, n * sizeof *keys);
     free(keys);
     free(sorted);
@@ -95,10 +90,10 @@ static void select_survives_bad_pivots(void **state)
         }
         double medians[3];
         for (int i = 0; i < 3; i++) {
-            qsort(sample + 3 * i, 3, sizeof *sample, by_value);
+            qsort(sample + 3 * i, 3, sizeof *sample, compare_doubles);
             medians[i] = sample[3 * i + 1];
         }
-        qsort(medians, 3, sizeof *medians, by_value);
+        qsort(medians, 3, sizeof *medians, compare_doubles);
         ptrdiff_t i = low, j = high;
         while (i <= j) {
             while (key[at[i]] < medians[1])

@@ -2,16 +2,11 @@
 /* tests/gb/test_voxel.c -- the base spatial scale against brute force, and voxel centres. */
 #include <float.h>
 
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "clouds.h"
 #include "gb/balls.h"
-
-static int by_value(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* Every pair, in double: squared distances of point i to the others, ascending, in `squared`. */
 static void all_distances(const float *position, size_t count, size_t i, double *squared)
@@ -26,7 +21,7 @@ static void all_distances(const float *position, size_t count, size_t i, double 
         if (j != i)
             squared[n++] = sum;
     }
-    qsort(squared, n, sizeof *squared, by_value);
+    qsort(squared, n, sizeof *squared, compare_doubles);
 }
 
 static double brute_scale(const float *position, size_t count, gbt_voxel_rule rule)
@@ -41,7 +36,7 @@ static double brute_scale(const float *position, size_t count, gbt_voxel_rule ru
             mean += squared[j] / (double)k;
         value[i] = rule == GBT_VOXEL_RULE_SQUARED ? mean : sqrt(squared[0]);
     }
-    qsort(value, count, sizeof *value, by_value);
+    qsort(value, count, sizeof *value, compare_doubles);
     size_t rank = rule == GBT_VOXEL_RULE_SQUARED ? (count / 2 > 0 ? count / 2 - 1 : 0) : (count - 1) / 2;
     double got = value[rank];
     if (got == 0) { /* the median of the positive ones */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/trace/test_trace.c -- the packet tracer and its adjoint against the double reference; threads,
    instruction sets, limits, failures. */
+#include "base/compare.h"
 #include "base/memory.h"
 #include "base/near.h"
 #include "base/parallel.h"
@@ -425,12 +426,6 @@ static void one_order_to_the_stop(void **state)
     assert_true(f.counters.blended > 5 * f.rays && f.counters.blended < COUNT * f.rays);
     ray_image_free(&rays);
     gaussians_free(&g);
-}
-
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 /* One needle (1, 1/r, 1/r) at a time, and a ray through its one-sigma shell: the worst that float32

@@ -78,7 +78,9 @@ static gbt_status save_exposures(const trainer *t, const char *path, gbt_error *
     return status;
 }
 
-gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err)
+/* The model also where the checkpoint, which is 20 times as large, cannot be written; exposures and poses
+   only beside a model of the same step. The first failure. */
+static gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err)
 {
     gbt_status status[4] = {checkpoint_save(t, paths->checkpoint, err)};
     status[1] = save_model(t, paths->model, err);
@@ -167,14 +169,15 @@ static void copy_piece(size_t block, size_t begin, size_t end, void *context)
     memcpy(job->to + begin, job->from + begin, end - begin);
 }
 
-static gbt_status copy_trainer(const trainer *t, trainer *copy, void **memory, gbt_error *err)
+/* False without the memory. */
+static bool copy_trainer(const trainer *t, trainer *copy, void **memory)
 {
     *copy = *t;
     copy->photos.source = &copy->scene;
     const copy_list list = list_arrays(copy);
-    unsigned char *at = mem_alloc(list.bytes, 1, "copy for a checkpoint", err);
+    unsigned char *at = mem_alloc(list.bytes, 1, "copy for a checkpoint", NULL);
     if (at == NULL)
-        return GBT_ERR_NO_MEMORY;
+        return false;
     *memory = at;
     for (int i = 0; i < list.count; i++) {
         const copied_array *a = &list.arrays[i];
@@ -183,7 +186,7 @@ static gbt_status copy_trainer(const trainer *t, trainer *copy, void **memory, g
         *a->array = at;
         at += to_lines(a->bytes);
     }
-    return GBT_OK;
+    return true;
 }
 
 static void write_copy(void *context)
@@ -195,7 +198,7 @@ static void write_copy(void *context)
 
 gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err)
 {
-    if (copy_trainer(t, &s->copy, &s->memory, NULL) != GBT_OK)
+    if (!copy_trainer(t, &s->copy, &s->memory))
         return save_surely(t, paths, err);
     s->paths = paths;
     beside_start(&s->job, write_copy, s);

@@ -14,12 +14,8 @@ typedef struct run_paths {
         checkpoint_previous[RUN_PATH_SIZE];
 } run_paths;
 
-/** Write all files. The model is written even when the checkpoint, which is 20 times as large, cannot be;
-    exposures and poses only together with a model of the same step. Returns the first failure. */
-gbt_status save_all(trainer *t, const run_paths *paths, gbt_error *err);
-
-/** The same with one retry and a warning after a failure, whose cause may be temporary. Returns the second
-    failure. */
+/** Write all files; after a failure, whose cause may be temporary, warn and write them once more. Returns the
+    second failure. */
 gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A background save: writes a copy of all changing state while steps go on. Start from {0}. */

@@ -90,13 +90,13 @@ static gbt_status take_uint(text_lines *lines, const char *what, uint64_t limit,
     return result == NUMBER_OK ? GBT_OK : bad_number(lines, result, what, token, length, err);
 }
 
-static gbt_status check_line_ends(text_lines *lines, const char *what, gbt_error *err)
+static gbt_status check_camera_ends(text_lines *lines, gbt_error *err)
 {
     const char *token;
     size_t length;
     if (!number_next_token(&lines->at, lines->end, &token, &length))
         return GBT_OK;
-    return raw_fail(err, place_of(lines), "%s has too many fields, from %.*s", what,
+    return raw_fail(err, place_of(lines), "camera has too many fields, from %.*s",
                     length < 60 ? (int)length : 60, token);
 }
 
@@ -125,7 +125,7 @@ static gbt_status read_cameras(const source_file *file, colmap_cameras *cameras,
         camera.height = (int)height;
         for (int k = 0; k < gbt_camera_param_count(camera.model); k++)
             GBT_TRY(take_double(&lines, "a camera parameter", &camera.params[k], err));
-        GBT_TRY(check_line_ends(&lines, "camera", err));
+        GBT_TRY(check_camera_ends(&lines, err));
         GBT_TRY(colmap_cameras_add(cameras, (uint32_t)id, &camera, place_of(&lines), err));
     }
     return colmap_cameras_sort(cameras, file->name, err);

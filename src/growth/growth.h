@@ -47,7 +47,7 @@ typedef struct growth_def {
     uint64_t seed;           /* seed of the random drop of candidates: level j keeps a share of 1 -
                                 0.5^(j+1) */
     uint64_t step;
-    bool grow, prune;                                                /* both true by default */
+    bool grow;                                                       /* true by default */
     bool (*may_stand)(const void *context, const float position[3]); /* whether a Gaussian candidate may get
                                                                         an anchor at this position; called
                                                                         from several threads. Default

@@ -9,7 +9,7 @@ static float shown_count(const growth_stats *stats, size_t i) { return fmaxf(sta
 
 static bool is_pruned(const growth_stats *stats, const growth_def *def, size_t i)
 {
-    return def->prune && growth_is_judged(def, stats->visit_count[i]) &&
+    return growth_is_judged(def, stats->visit_count[i]) &&
            stats->importance_accum[i] < def->importance_min * shown_count(stats, i);
 }
 

@@ -34,7 +34,6 @@ growth_def growth_def_default(void)
                         .seed = 0,
                         .step = 0,
                         .grow = true,
-                        .prune = true,
                         .may_stand = growth_anywhere};
 }
 
@@ -77,7 +76,7 @@ static void reset_block(size_t block, size_t begin, size_t end, void *context)
     growth_stats *s = job->stats;
     const size_t offsets = (size_t)s->offset_count;
     for (size_t i = begin; i < end; i++)
-        if (job->def->prune && growth_is_judged(job->def, s->visit_count[i]))
+        if (growth_is_judged(job->def, s->visit_count[i]))
             s->importance_accum[i] = s->visit_count[i] = s->shown_count[i] = 0;
     for (size_t k = begin * offsets; k < end * offsets; k++)
         if (job->def->grow && growth_well_sampled(job->def, s->grad_count[k]))

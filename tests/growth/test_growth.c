@@ -306,26 +306,23 @@ static void the_last_anchor_stays(void **state)
     free_scene(&sc, &r);
 }
 
-static void parts_can_be_switched_off(void **state)
+static void growing_can_be_switched_off(void **state)
 {
     (void)state;
-    for (int mode = 0; mode < 4; mode++) {
+    for (int grow = 0; grow < 2; grow++) {
         scene sc = empty_scene(2, 1);
         sc.a.offset[0] = 17.0f;
         set_gradient(&sc, 0, 2.5e-4f);
         sc.s.visit_count[1] = sc.s.shown_count[1] = 100;
         growth_def def = growth_def_default();
         def.voxel_size = 1.0f;
-        def.grow = mode & 1;
-        def.prune = mode & 2;
+        def.grow = grow;
         keep_all(&def, 2);
         growth_result r;
         assert_ok(growth_round(&sc.a, &sc.s, &def, &r, NULL));
-        assert_int_equal(r.grown, mode & 1);
-        assert_int_equal(r.pruned, mode >> 1);
+        assert_int_equal(r.grown, grow);
+        assert_int_equal(r.pruned, 1);
         assert_true(sc.s.grad_count[0] == (def.grow ? 0.0f : 50.0f)); /* what was not used is kept */
-        if (!def.prune)
-            assert_true(sc.s.visit_count[1] == 100);
         free_scene(&sc, &r);
     }
 }
@@ -667,7 +664,7 @@ static void an_explosion_is_capped(void **state)
                 growth_def def = growth_def_default();
                 def.voxel_size = 0.01f;
                 def.grad_threshold = 0.0f;
-                def.prune = false;
+                def.importance_min = 0;
                 def.max_anchors = i == 0 ? cap : SIZE_MAX;
                 assert_ok(growth_round(&both[i]->a, &both[i]->s, &def, &r[i], NULL));
             }
@@ -884,7 +881,7 @@ int main(void)
         cmocka_unit_test(cells_round_half_to_even),
         cmocka_unit_test(shape_scales_are_cut),
         cmocka_unit_test(the_last_anchor_stays),
-        cmocka_unit_test(parts_can_be_switched_off),
+        cmocka_unit_test(growing_can_be_switched_off),
         cmocka_unit_test(the_cap_takes_the_largest_gradients),
         cmocka_unit_test(a_cell_is_worth_its_best_candidate),
         cmocka_unit_test(rounds_agree_with_brute_force),

@@ -35,7 +35,7 @@ static inline void dvec_cross(const double a[3], const double b[3], double out[3
 
 static inline double dvec_length(const double a[3]) { return sqrt(dvec_dot(a, a)); }
 
-/** The length of (x, y), with the same bits everywhere, unlike hypot(). */
+/** The length of (x, y), with the same bits everywhere, unlike the C library's hypot. */
 static inline double dvec_length2(double x, double y) { return sqrt(x * x + y * y); }
 
 /** Direction i of `count` directions spread evenly over the sphere by a Fibonacci spiral (Gonzalez 2010). */

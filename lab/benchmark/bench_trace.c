@@ -88,7 +88,7 @@ static void list_figures(const measured *m, size_t way, figure_row rows[ROW_COUN
         {"nodes per ray", "nodes_per_ray", (double)c->nodes / n, 2, true},
         {"candidates per packet", "candidates_per_packet", (double)c->candidates / packets, 1, true},
         {"rows per packet", "rows_per_packet", (double)c->rows / packets, 1, true},
-        {"pairs of rows per packet", "row_pairs_per_packet", (double)c->pairs / packets, 1, true},
+        {"pairs of rows per packet", "row_pairs_per_packet", (double)c->order_steps / packets, 1, true},
         {"packets spilled", "spilled_packets", (double)c->spilled_packets, 0, false},
         {"tape, MB", NULL, (double)c->tape_bytes * 1e-6, 2, true},
         {"tree, MB", NULL, (double)f->tree_bytes * 1e-6, 2, true},

@@ -112,7 +112,7 @@ static void keep_figures(const bench_scene *s, const bench_way *way, const bench
     row->forward_us = way->figures.forward_us;
     row->both_us = row->forward_us + way->figures.adjoint_us;
     row->blended = (double)way->figures.counters.blended / rays;
-    row->pairs = (double)way->figures.counters.pairs / (rays / PACKET_LANES);
+    row->pairs = (double)way->figures.counters.order_steps / (rays / PACKET_LANES);
     row->error = bench_reference_compare(want, &way->rgb);
 }
 

@@ -161,7 +161,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 }
 
 /* Transpose 8 x 8 floats. */
-static inline void turn8(const float *const rows[8], __m256 out[8])
+static inline void transpose8(const float *const rows[8], __m256 out[8])
 {
     __m256 x[8], y[8];
     for (int i = 0; i < 8; i++)
@@ -181,15 +181,15 @@ static inline void turn8(const float *const rows[8], __m256 out[8])
     }
 }
 
-static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])
+static inline void vfloat16_load_transposed(const float *const rows[16], vfloat16 out[16])
 {
     for (int half = 0; half < 2; half++) {
         __m256 low[8], high[8];
         const float *right[16];
         for (int i = 0; i < 16; i++)
             right[i] = rows[i] + 8 * half;
-        turn8(right, low);
-        turn8(right + 8, high);
+        transpose8(right, low);
+        transpose8(right + 8, high);
         for (int j = 0; j < 8; j++)
             out[8 * half + j] = (vfloat16){low[j], high[j]};
     }

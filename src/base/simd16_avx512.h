@@ -130,7 +130,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 }
 
 /* Transpose 16 x 16 floats: lane i of out[j] = rows[i][j]. */
-static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])
+static inline void vfloat16_load_transposed(const float *const rows[16], vfloat16 out[16])
 {
     vfloat16 x[16], y[16];
     for (int i = 0; i < 16; i++)

@@ -138,7 +138,7 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
 }
 
 #define VFLOAT16_TURN_ROWS(name, op)                                                                         \
-    static inline float32x4_t name##_turned(float32x4_t x, float32x4_t y, float32x4_t z, float32x4_t w)      \
+    static inline float32x4_t name##_transposed(float32x4_t x, float32x4_t y, float32x4_t z, float32x4_t w)  \
     {                                                                                                        \
         const float32x4_t xy = op(lower_halves(x, y), upper_halves(x, y));                                   \
         const float32x4_t zw = op(lower_halves(z, w), upper_halves(z, w));                                   \
@@ -149,8 +149,8 @@ static inline float32x4_t upper_halves(float32x4_t x, float32x4_t y)
     static inline float32x4_t name##_lanes(vfloat16 x) { return op(op(x.a, x.c), op(x.b, x.d)); }            \
     static inline float32x4_t name##_four(const vfloat16 *in)                                                \
     {                                                                                                        \
-        return name##_turned(name##_lanes(in[0]), name##_lanes(in[1]), name##_lanes(in[2]),                  \
-                             name##_lanes(in[3]));                                                           \
+        return name##_transposed(name##_lanes(in[0]), name##_lanes(in[1]), name##_lanes(in[2]),              \
+                                 name##_lanes(in[3]));                                                       \
     }                                                                                                        \
     static inline vfloat16 name(const vfloat16 in[16])                                                       \
     {                                                                                                        \
@@ -177,8 +177,8 @@ static inline vfloat8 vfloat16_fold_product(vfloat16 x, vfloat16 y)
 }
 static inline float32x4_t sum4_rows(const vfloat8 *in)
 {
-    return sum_turned(vaddq_f32(in[0].a, in[0].b), vaddq_f32(in[1].a, in[1].b), vaddq_f32(in[2].a, in[2].b),
-                      vaddq_f32(in[3].a, in[3].b));
+    return sum_transposed(vaddq_f32(in[0].a, in[0].b), vaddq_f32(in[1].a, in[1].b),
+                          vaddq_f32(in[2].a, in[2].b), vaddq_f32(in[3].a, in[3].b));
 }
 static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 {
@@ -186,7 +186,7 @@ static inline vfloat16 vfloat8_sum_rows(const vfloat8 in[16])
 }
 
 /* Transpose 4 x 4 floats. */
-static inline void turn4(const float *const rows[4], size_t column, float32x4_t out[4])
+static inline void transpose4(const float *const rows[4], size_t column, float32x4_t out[4])
 {
     const float32x4_t x = vld1q_f32(rows[0] + column), y = vld1q_f32(rows[1] + column);
     const float32x4_t z = vld1q_f32(rows[2] + column), w = vld1q_f32(rows[3] + column);
@@ -198,14 +198,14 @@ static inline void turn4(const float *const rows[4], size_t column, float32x4_t 
     out[3] = upper_halves(xy1, zw1);
 }
 
-static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])
+static inline void vfloat16_load_transposed(const float *const rows[16], vfloat16 out[16])
 {
     for (size_t column = 0; column < 16; column += 4) {
         float32x4_t a[4], b[4], c[4], d[4];
-        turn4(rows, column, a);
-        turn4(rows + 4, column, b);
-        turn4(rows + 8, column, c);
-        turn4(rows + 12, column, d);
+        transpose4(rows, column, a);
+        transpose4(rows + 4, column, b);
+        transpose4(rows + 8, column, c);
+        transpose4(rows + 12, column, d);
         for (size_t j = 0; j < 4; j++)
             out[column + j] = (vfloat16){a[j], b[j], c[j], d[j]};
     }

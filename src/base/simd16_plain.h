@@ -164,7 +164,7 @@ static inline vfloat16 vfloat16_max_rows(const vfloat16 in[16])
     EACH out.v[i] = vfloat16_highest(in[i]);
     return out;
 }
-static inline void vfloat16_load_turned(const float *const rows[16], vfloat16 out[16])
+static inline void vfloat16_load_transposed(const float *const rows[16], vfloat16 out[16])
 {
     EACH for (int j = 0; j < 16; j++) out[j].v[i] = rows[i][j];
 }

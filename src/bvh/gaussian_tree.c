@@ -57,7 +57,7 @@ static void set_ellipsoid(const builder *b, uint32_t id, tree_leaf *leaf, size_t
             m[3 * row + axis] *= s[axis];
     for (int k = 0; k < 6; k++) {
         const float *x = m + 3 * pair[k][0], *y = m + 3 * pair[k][1];
-        leaf->spread[k][slot] = square * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2]);
+        leaf->covariance[k][slot] = square * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2]);
     }
     leaf->mean[0][slot] = g->mean_x[id];
     leaf->mean[1][slot] = g->mean_y[id];

@@ -26,11 +26,11 @@ typedef struct tree_node {
     uint64_t child[TREE_WIDTH]; /* address of a tree_node, or that of a tree_leaf + 1 */
 } tree_node;
 
-/** Ellipsoids { x : (x - mean)^T spread^-1 (x - mean) <= 1 }: spread = k^2 R S S R^T, S the scales. Unused
-   slots repeat the first. */
+/** Ellipsoids { x : (x - mean)^T covariance^-1 (x - mean) <= 1 }: covariance = k^2 R S S R^T, S the scales.
+   Unused slots repeat the first. */
 typedef struct tree_leaf {
     _Alignas(64) float mean[3][TREE_WIDTH];
-    float spread[6][TREE_WIDTH]; /* xx yy zz yz zx xy */
+    float covariance[6][TREE_WIDTH]; /* xx yy zz yz zx xy */
     uint32_t id[TREE_WIDTH];
     uint32_t count;
 } tree_leaf;

@@ -167,14 +167,14 @@ static bool forward_ewa(tile_job *job, ray_scratch *scratch)
 }
 
 /* The pixels of a block in the adjoint. */
-typedef struct ewa_return {
+typedef struct ewa_adjoint_state {
     vfloat16 transmittance; /* T behind the splat at hand */
     vfloat16 behind;        /* g . B: B the colour behind the splat, divided by T there; g = dL/d(rgb) */
     vfloat16 d_rgb[3], stop;
-} ewa_return;
+} ewa_adjoint_state;
 
-static inline void return_through(const tile_job *job, const splat *s, const float at[2], int block,
-                                  vfloat16 number, ewa_return *b, vfloat16 sum[EWA_SUMS])
+static inline void blend_splat_adjoint(const tile_job *job, const splat *s, const float at[2], int block,
+                                       vfloat16 number, ewa_adjoint_state *b, vfloat16 sum[EWA_SUMS])
 {
     const raster_settings *settings = &job->view->settings;
     const vfloat16 alpha_max = vfloat16_set1(settings->alpha_max), zero = vfloat16_set1(0);
@@ -216,9 +216,9 @@ static inline void store_sums(const vfloat16 *sum, int count, float *out)
 static bool backward_ewa(tile_job *job, ray_scratch *scratch)
 {
     (void)scratch;
-    ewa_return state[TILE_BLOCKS];
+    ewa_adjoint_state state[TILE_BLOCKS];
     for (int block = 0; block < TILE_BLOCKS; block++) {
-        ewa_return *b = &state[block];
+        ewa_adjoint_state *b = &state[block];
         b->transmittance = vfloat16_load(job->tape->transmittance[block]);
         b->stop = vfloat16_load(job->tape->stop[block]);
         b->behind = vfloat16_set1(0);
@@ -244,7 +244,7 @@ static bool backward_ewa(tile_job *job, ray_scratch *scratch)
         splat_in_tile(job, s, at);
         for (; bits != 0; bits &= bits - 1) {
             const int block = __builtin_ctz(bits);
-            return_through(job, s, at, block, vfloat16_set1((float)e), &state[block], sum);
+            blend_splat_adjoint(job, s, at, block, vfloat16_set1((float)e), &state[block], sum);
         }
         store_sums(sum, EWA_SUMS, record);
     }

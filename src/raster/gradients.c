@@ -55,8 +55,9 @@ static one_gaussian read_gaussian(const gaussians *g, size_t i)
 /* The adjoint of one row of the projection (x or y). With ratio = X / Z the image point is focal ratio +
    shift, and the image of axis a is focal / Z (a_row - k a_z), where k is the ratio kept within limits. Sets
    dL/d(X or Y), adds to dL/dZ. */
-static void return_row(double focal, double ratio, double k, double z_inverse, const double a[3],
-                       const double az[3], double d_point, const double d_y[3], double *d_x, double *d_z)
+static void project_row_adjoint(double focal, double ratio, double k, double z_inverse, const double a[3],
+                                const double az[3], double d_point, const double d_y[3], double *d_x,
+                                double *d_z)
 {
     const double gain = focal * z_inverse;
     double d_gain = 0, d_k = 0;
@@ -69,8 +70,8 @@ static void return_row(double focal, double ratio, double k, double z_inverse, c
     *d_z -= (d_ratio * ratio + d_gain * gain) * z_inverse;
 }
 
-static shape_gradient return_ewa(const raster_view *view, const one_gaussian *g, const splat *s,
-                                 const double *sum)
+static shape_gradient ewa_adjoint(const raster_view *view, const one_gaussian *g, const splat *s,
+                                  const double *sum)
 {
     const double unit = 1 / HALF_LOG2_E, l[3] = {(double)s->chol[0], (double)s->chol[1], (double)s->chol[2]};
     const double d_point[2] = {-unit * l[0] * sum[1], -unit * (l[1] * sum[1] + l[2] * sum[2])};
@@ -102,8 +103,8 @@ static shape_gradient return_ewa(const raster_view *view, const one_gaussian *g,
         d_y[1][k] = 2 * (dxy * y[0][k] + dyy * y[1][k]);
     }
     for (int r = 0; r < 2; r++)
-        return_row(focal[r], ratio[r], kept[r], z_inverse, axis[r], axis[2], d_point[r], d_y[r], &d_t[r],
-                   &d_t[2]);
+        project_row_adjoint(focal[r], ratio[r], kept[r], z_inverse, axis[r], axis[2], d_point[r], d_y[r],
+                            &d_t[r], &d_t[2]);
     shape_gradient out;
     dmat_apply_transposed(view->rotation, d_t, out.mean);
     for (int j = 0; j < 3; j++)
@@ -112,7 +113,7 @@ static shape_gradient return_ewa(const raster_view *view, const one_gaussian *g,
     return out;
 }
 
-static shape_gradient return_ray(const one_gaussian *g, const double *sum)
+static shape_gradient ray_form_adjoint(const one_gaussian *g, const double *sum)
 {
     shape_gradient out;
     const double *inverse = g->scale_inverse,
@@ -144,7 +145,7 @@ static void store_gradient(const one_gaussian *g, const shape_gradient *d, size_
     out->quat_z[i] = (float)(2 * (q[0] * wz + q[1] * wy - q[2] * wx));
 }
 
-static void return_block(size_t block, size_t begin, size_t end, void *context)
+static void gradients_of_block(size_t block, size_t begin, size_t end, void *context)
 {
     (void)end;
     const gradient_job *job = context;
@@ -164,8 +165,8 @@ static void return_block(size_t block, size_t begin, size_t end, void *context)
         if (!any)
             continue;
         const one_gaussian g = read_gaussian(job->g, i);
-        const shape_gradient d =
-            job->view->settings.form == RASTER_EWA ? return_ewa(job->view, &g, s, sum) : return_ray(&g, sum);
+        const shape_gradient d = job->view->settings.form == RASTER_EWA ? ewa_adjoint(job->view, &g, s, sum)
+                                                                        : ray_form_adjoint(&g, sum);
         const double *color = sum + (job->view->settings.form == RASTER_EWA ? EWA_COLOR : RAY_COLOR);
         if (job->weight != NULL)
             job->weight[i] = (float)color[3]; /* the weight follows the colour in both forms */
@@ -186,6 +187,6 @@ gbt_status raster_gradients(const raster_view *view, const gaussians *g, const s
     if (weight != NULL)
         memset(weight, 0, g->count * sizeof *weight);
     gradient_job job = {view, g, splats, drawn, lists, records, out, weight};
-    parallel_blocks(g->count, SPLAT_GRAIN, return_block, &job);
+    parallel_blocks(g->count, SPLAT_GRAIN, gradients_of_block, &job);
     return GBT_OK;
 }

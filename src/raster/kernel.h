@@ -89,7 +89,7 @@ static inline size_t raster_sum_count(raster_form form) { return form == RASTER_
 typedef struct ray_scratch {
     struct ray_row *rows;
     size_t row_capacity;
-    struct ray_hit *hits;
+    struct splat_hit *hits;
     size_t hit_capacity;
     uint16_t *reached; /* per entry: bit per block */
     size_t reached_capacity;

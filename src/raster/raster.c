@@ -197,7 +197,7 @@ static bool backward_tile(const pass *p, tile_job *job, ray_scratch *scratch)
 }
 
 /* The background of every pixel of a tile. */
-static void look_behind(const tile_job *job)
+static void set_background(const tile_job *job)
 {
     const raster_view *view = job->view;
     float dir[3][PIXEL_LANES];
@@ -243,7 +243,7 @@ static void run_tile(size_t index, size_t begin, size_t end, void *context)
                     .tape = tape ? &state->tapes[index] : NULL,
                     .blocks = tape ? state->blocks + first : NULL,
                     .records = state->records};
-    look_behind(&job);
+    set_background(&job);
     if (!(p->d_rgb == NULL ? forward_tile(p, &job, &scratch) : backward_tile(p, &job, &scratch)))
         atomic_store(&p->failed, true);
     state->blended[index] = job.blended;

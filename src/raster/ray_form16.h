@@ -19,11 +19,11 @@ typedef struct ray_row {
     uint32_t entry;
 } ray_row;
 
-typedef struct ray_hit {
+typedef struct splat_hit {
     uint64_t key; /* bits of t, then the index: depths are positive, so their bits are in the order of their
                      values */
     uint32_t row;
-} ray_hit;
+} splat_hit;
 
 /* Rays (a, b, 1) in camera axes; a and b are relative to the middle of the block, so that differences to a
    mean keep their digits. */
@@ -165,23 +165,23 @@ static inline bool gather_rows(tile_job *job, int block, const block_rays *rays,
                                            vfloat16_set1(0)));
         row->entry = (uint32_t)e;
     }
-    return mem_reserve((void **)&scratch->hits, &scratch->hit_capacity, 0, *count, sizeof(ray_hit),
+    return mem_reserve((void **)&scratch->hits, &scratch->hit_capacity, 0, *count, sizeof(splat_hit),
                        "hits of a ray", NULL) == GBT_OK;
 }
 
 static int compare_hits(const void *a, const void *b)
 {
-    const ray_hit *p = a, *q = b;
+    const splat_hit *p = a, *q = b;
     return (p->key > q->key) - (p->key < q->key);
 }
 
 /* Insertion sort, because the list of the tile is nearly in this order already; qsort() if it takes too many
    moves. */
-static inline void sort_ray(ray_hit *hits, size_t count)
+static inline void sort_ray(splat_hit *hits, size_t count)
 {
     size_t moves = 16 * count;
     for (size_t i = 1; i < count; i++) {
-        const ray_hit moved = hits[i];
+        const splat_hit moved = hits[i];
         size_t j = i;
         for (; j > 0 && hits[j - 1].key > moved.key; j--)
             hits[j] = hits[j - 1];
@@ -205,13 +205,13 @@ static inline size_t hits_of_ray(const tile_job *job, const ray_scratch *scratch
         if (!job->view->settings.order_by_center)
             memcpy(&bits, &row->t[lane], sizeof bits);
         scratch->hits[count++] =
-            (ray_hit){(uint64_t)bits << 32 | job->splats[job->entries[row->entry].splat].id, (uint32_t)i};
+            (splat_hit){(uint64_t)bits << 32 | job->splats[job->entries[row->entry].splat].id, (uint32_t)i};
     }
     sort_ray(scratch->hits, count);
     return count;
 }
 
-static inline const float *row_color(const tile_job *job, const ray_scratch *scratch, const ray_hit *hit)
+static inline const float *row_color(const tile_job *job, const ray_scratch *scratch, const splat_hit *hit)
 {
     return job->splats[job->entries[scratch->rows[hit->row].entry].splat].color;
 }
@@ -257,8 +257,8 @@ static bool forward_rays(tile_job *job, ray_scratch *scratch)
 }
 
 /* Back to front; t and alpha of the ray's rows become dL/dalpha and T alpha, 0 where nothing was blended. */
-static inline void return_ray(tile_job *job, ray_scratch *scratch, size_t row_count, int block, int lane,
-                              const float d_rgb[3])
+static inline void blend_ray_adjoint(tile_job *job, ray_scratch *scratch, size_t row_count, int block,
+                                     int lane, const float d_rgb[3])
 {
     float rgb[3], T, behind = 0;
     const size_t count = hits_of_ray(job, scratch, row_count, lane),
@@ -333,7 +333,7 @@ static bool backward_rays(tile_job *job, ray_scratch *scratch)
             const float d[3] = {job->pixels->rgb[block][0][lane], job->pixels->rgb[block][1][lane],
                                 job->pixels->rgb[block][2][lane]};
             if (inside >> lane & 1)
-                return_ray(job, scratch, row_count, block, lane, d);
+                blend_ray_adjoint(job, scratch, row_count, block, lane, d);
         }
         /* Lanes outside the image have no hits: their alpha is 0 in all rows, so that their t is not read as
            a gradient. */

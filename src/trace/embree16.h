@@ -25,7 +25,7 @@ typedef struct embree_visit {
 static void visit_gaussian(uint32_t id, unsigned lanes, void *user)
 {
     embree_visit *v = user;
-    const gaussian_lanes g = spread_gaussian(v->scene->records + (size_t)id * RECORD_FLOATS);
+    const gaussian_lanes g = broadcast_gaussian(v->scene->records + (size_t)id * RECORD_FLOATS);
     const response r = respond(&g, v->ray, vfloat16_set1(v->scene->settings.t_near));
     const vfloat16 raw = response_alpha(&g, r.d2);
     const vmask16 hit =

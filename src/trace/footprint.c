@@ -86,7 +86,7 @@ typedef struct gaussian8 {
 /* ---- the pixel at a point ---- */
 
 /* Unit directions from the camera to points; returns the distances. */
-LANE_CODE d8 look(const footprint_view *view, const d8 point[3], d8 dir[3])
+LANE_CODE d8 directions_to(const footprint_view *view, const d8 point[3], d8 dir[3])
 {
     for (int k = 0; k < 3; k++)
         dir[k] = point[k] - view->center[k];
@@ -139,7 +139,7 @@ void footprint_pixels(const footprint_view *view, double point[3][LANES], double
 {
     d8 at[3], dir[3], unused[3];
     memcpy(at, point, sizeof at);
-    const d8 distance = look(view, at, dir), there = pixel_at(view, distance, dir, unused);
+    const d8 distance = directions_to(view, at, dir), there = pixel_at(view, distance, dir, unused);
     memcpy(pixel, &there, sizeof there);
 }
 
@@ -190,7 +190,7 @@ LANE_CODE void prepare(const footprint_view *view, double variance, d8 pixel_min
                        widening *x)
 {
     axes_of(g->quat, x->axes);
-    x->distance = look(view, g->mean, x->dir);
+    x->distance = directions_to(view, g->mean, x->dir);
     d8 d_pixel[3];
     const d8 there = pixel_at(view, x->distance, x->dir, d_pixel);
     const m8 larger = there >= pixel_min;
@@ -269,7 +269,7 @@ static gaussian8 broadcast(const footprint_gaussian *g)
     return out;
 }
 
-static footprint_gaussian first(const gaussian8 *g)
+static footprint_gaussian gaussian_of_lane_0(const gaussian8 *g)
 {
     return (footprint_gaussian){.mean = {g->mean[0][0], g->mean[1][0], g->mean[2][0]},
                                 .scale = {g->scale[0][0], g->scale[1][0], g->scale[2][0]},
@@ -281,7 +281,7 @@ void footprint_widen(const footprint_view *view, double variance, double pixel_m
 {
     gaussian8 lanes = broadcast(g);
     widen_lanes(view, variance, d8_set(pixel_min), &lanes);
-    *g = first(&lanes);
+    *g = gaussian_of_lane_0(&lanes);
 }
 
 /* ---- arrays ---- */

@@ -53,7 +53,7 @@ typedef struct gaussian_lanes {
     vfloat16 mean[3], matrix[9], opacity;
 } gaussian_lanes;
 
-static inline gaussian_lanes spread_gaussian(const float *record)
+static inline gaussian_lanes broadcast_gaussian(const float *record)
 {
     gaussian_lanes g;
     for (int i = 0; i < 3; i++)
@@ -72,7 +72,7 @@ static inline gaussian_lanes load_gaussians(const kernel_scene *scene, const uin
     gaussian_lanes g;
     for (int i = 0; i < 16; i++)
         rows[i] = scene->records + (size_t)id[i] * RECORD_FLOATS;
-    vfloat16_load_turned(rows, field);
+    vfloat16_load_transposed(rows, field);
     for (int i = 0; i < 3; i++)
         g.mean[i] = field[RECORD_MEAN + i];
     for (int i = 0; i < 3 && color != NULL; i++)

@@ -129,7 +129,10 @@ typedef struct gradient_list {
 gradient_record *gradient_list_find(gradient_list *list, uint32_t id);
 
 typedef struct kernel_counters {
-    uint64_t rays, nodes, candidates, tests, hits, blended, rows, pairs, spilled_packets, tape_bytes;
+    uint64_t rays, nodes, candidates, tests, hits, blended, rows;
+    uint64_t order_steps; /* of finding the order of rows: steps of insertion (lists), compared pairs (tree)
+                           */
+    uint64_t spilled_packets, tape_bytes;
 } kernel_counters;
 
 /* Ordered by (t_c, index): depths are positive, so their bits are in the order of their values. */
@@ -138,12 +141,16 @@ typedef struct ray_hit {
     float alpha;
 } ray_hit;
 
+/* Least component of a ray's unit direction along the third axis of its frame, about the cosine of 72
+ * degrees. */
+#define AXIS_COMPONENT_MIN 0.3f
+
 /* The rays of a tile of pixels. */
 typedef struct tile_rays {
     packet_rays packet[TILE_PACKETS];
-    bool common_origin;               /* all of them start at one point */
-    bool parts;                       /* only a part of each ray is traced: near <= t_c < far */
-    uint16_t elsewhere[TILE_PACKETS]; /* bit per lane whose pixel belongs to another part of the tile
+    bool common_origin;                /* all of them start at one point */
+    bool parts;                        /* only a part of each ray is traced: near <= t_c < far */
+    uint16_t other_part[TILE_PACKETS]; /* bit per lane whose pixel belongs to another part of the tile
                                          (list_view.h) */
 } tile_rays;
 

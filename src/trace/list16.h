@@ -5,7 +5,7 @@
    finds a depth for each, by which it sorts them (long lists by radix sort, short ones by counting smaller
    keys), and a lower bound of the depth anywhere in the tile. list->nearest[] holds the smallest bound from
    each sixteen on: a packet stops there once its rays have become opaque in front of that depth.
-   rows_in_packet() tests sixteen ellipses at once against the slopes of a packet. Included by
+   gaussians_in_packet() tests sixteen ellipses at once against the slopes of a packet. Included by
    list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST16_H
 #define GBT_TRACE_LIST16_H
@@ -163,8 +163,8 @@ static inline void depth_in_tile(const list_memory *m, size_t first, const float
         rows[i] = (const float *)(const void *)&m->unsorted[first + (size_t)i];
         shapes[i] = (const float *)(const void *)&m->shape[first + (size_t)i];
     }
-    vfloat16_load_turned(rows, r);
-    vfloat16_load_turned(shapes, s);
+    vfloat16_load_transposed(rows, r);
+    vfloat16_load_transposed(shapes, s);
     const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0);
     vfloat16 at[2], reach = one;
     for (int k = 0; k < 2; k++) {
@@ -212,9 +212,9 @@ static inline void depth_of_ellipsoid(const kernel_scene *scene, const list_fram
     const float near = e->center[2] - 1.0001f * sqrtf(e->ww) -
                        4e-6f * (fabsf(e->center[0]) + fabsf(e->center[1]) + fabsf(e->center[2])),
                 t = along / square, t_near = scene->settings.t_near;
-    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > 0.3 (list_faces.c). Keys give only a
+    /* A hit has t >= t_near, and rays of a face have 1 / |(a, b, 1)| > AXIS_COMPONENT_MIN. Keys give only a
        first order: what is cut at t_near, or not ahead, just has to stand in front. */
-    m->bound[i] = larger(0.3f * t_near, 0.99999f * near);
+    m->bound[i] = larger(AXIS_COMPONENT_MIN * t_near, 0.99999f * near);
     m->key[i] = t > 0.5f * t_near && t < 1e30f ? t : 0.5f * t_near; /* NaN fails */
 }
 
@@ -388,7 +388,7 @@ static bool load_list(const kernel_scene *scene, const list_view *view, size_t p
    somewhere in the box of the packet's slopes. In a box the form is smallest at its centre, if that is
    inside, else on the edge nearest to the centre in a or that in b. So it is minimised along both lines, each
    clamped to the box. */
-static inline unsigned rows_in_packet(const tile_list *list, size_t first, const packet_slopes *slopes)
+static inline unsigned gaussians_in_packet(const tile_list *list, size_t first, const packet_slopes *slopes)
 {
     const slope_box *box = &slopes->box;
     const float *const *shape = (const float *const *)list->shape;

@@ -60,8 +60,8 @@ static bool load_used(const list_view *view, size_t part, const double middle[2]
 }
 
 /* insert_row() when the tape says how far row i steps back, so that no branch depends on what it meets. Where
-   row i has a hit in front of one of row j, kept[j] becomes i: collect_behind() has to go on from row j as
-   far as that. */
+   row i has a hit in front of one of row j, last_passed[j] becomes i: collect_behind() has to go on from row
+   j as far as that. */
 static inline void insert_again(const packet_hits *rows, insertion *s, const tape_entry *entry, int i,
                                 vfloat16 t, vfloat16 alpha)
 {
@@ -69,7 +69,7 @@ static inline void insert_again(const packet_hits *rows, insertion *s, const tap
     near_row now = {.t = t, .alpha = alpha, .term = vfloat16_set1(0)};
     vfloat16 product = vfloat16_set1(1);
     row_store(rows->before, i, s->before);
-    rows->kept[i] = (uint32_t)i + 2;
+    rows->last_passed[i] = (uint32_t)i + 2;
     pass_row(&now, &s->last, &product);
     pass_row(&now, &s->second, &product);
     s->crowded = s->crowded || back == TAPE_SORTED;
@@ -78,7 +78,7 @@ static inline void insert_again(const packet_hits *rows, insertion *s, const tap
         row_store(rows->T_front, j, vfloat16_less_where(front, row_load(rows->T_front, j), alpha));
         product = vfloat16_less_unless(front, product, row_load(rows->alpha, j));
         const unsigned met = vmask16_bits(front) & entry[i].lanes & entry[j].lanes;
-        rows->kept[j] = met ? (uint32_t)i : rows->kept[j];
+        rows->last_passed[j] = met ? (uint32_t)i : rows->last_passed[j];
     }
     now.value = vfloat16_mul(row_load(rows->before, s->crowded ? i : first), product);
     row_store(rows->T_front, i - 2, s->second.value);
@@ -152,7 +152,7 @@ static PASS bool collect_behind(packet_hits *out, const used_list *used, const v
     for (int i = count; i < count + 3; i++)
         row_store(rows->before, i, background);
     for (int i = count; i-- > 0;) {
-        const int last = (int)rows->kept[i];
+        const int last = (int)rows->last_passed[i];
         near_row now = {.t = row_load(rows->t, i), .alpha = zero};
         now.term = vfloat16_mul(vfloat16_mul(row_load(rows->T_front, i), row_load(rows->alpha, i)),
                                 dot_lanes(used_gaussian[rows->number[i]].color, direction));
@@ -247,7 +247,7 @@ static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], co
 static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id, vmask16 hit,
                         vfloat16 h, vfloat16 weight, const vfloat16 d_rgb[3], float *to)
 {
-    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
+    const gaussian_lanes g = broadcast_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
     ray_lanes ray;
     vfloat16 v[3];
@@ -323,7 +323,7 @@ static PASS void sum_in_order(const packet_pass *p, const used_list *used, const
         const size_t left = count - done;
         const tile_gaussian *g[TOGETHER];
         row_response r[TOGETHER];
-        vfloat16 alpha[TOGETHER], clear[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
+        vfloat16 alpha[TOGETHER], one_minus_alpha[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
             v[TOGETHER][3];
         uint32_t number[TOGETHER];
         for (size_t k = 0; k < TOGETHER; k++) {
@@ -334,8 +334,8 @@ static PASS void sum_in_order(const packet_pass *p, const used_list *used, const
         for (size_t k = 0; k < TOGETHER; k++) {
             const vmask16 hit = vmask16_from_bits(entry[k < left ? left - 1 - k : 0].lanes);
             alpha[k] = vfloat16_select(hit, vfloat16_min(r[k].raw, alpha_max), zero);
-            clear[k] = vfloat16_sub(one, alpha[k]);
-            inverse[k] = vfloat16_div(one, clear[k]);
+            one_minus_alpha[k] = vfloat16_sub(one, alpha[k]);
+            inverse[k] = vfloat16_div(one, one_minus_alpha[k]);
         }
         for (size_t k = 0; k < TOGETHER; k++) { /* the cap: see row_gradients() */
             const vfloat16 color = dot_lanes(g[k]->color, d_rgb);
@@ -344,7 +344,7 @@ static PASS void sum_in_order(const packet_pass *p, const used_list *used, const
             const vfloat16 d_log = vfloat16_mul(weight[k], vfloat16_sub(color, behind));
             h[k] = vfloat16_select(vfloat16_lt(alpha[k], alpha_max),
                                    vfloat16_mul(vfloat16_set1(-0.5f), d_log), zero);
-            behind = vfloat16_fma(clear[k], behind, vfloat16_mul(alpha[k], color));
+            behind = vfloat16_fma(one_minus_alpha[k], behind, vfloat16_mul(alpha[k], color));
         }
         for (size_t k = 0; k < TOGETHER && k < left; k++) {
             float *to = sums[number[k]].sum;
@@ -460,7 +460,7 @@ static void turn_sums(const kernel_scene *scene, const list_view *view, const li
         const gaussian_lanes g = load_gaussians(scene, id, NULL);
         view_form_find(face->frame.axis, &g, vfloat16_load(slope[0]), vfloat16_load(slope[1]),
                        vfloat16_load(slope[2]), &form);
-        vfloat16_load_turned(rows, sum);
+        vfloat16_load_transposed(rows, sum);
         const vfloat16 zero = vfloat16_set1(0), R = form.distance, RR = vfloat16_mul(R, R);
         vfloat16 hv[3], hvv[6];
         for (int k = 0; k < 3; k++)

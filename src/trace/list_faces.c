@@ -19,10 +19,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
-
-/* Cosine of 72 degrees: how far from its axis a face sees rays. */
-static const float component_least = 0.3f;
-
 /* ---- axes ---- */
 
 /* From the valid directions on a coarse grid of pixels: their sum (`middle`), and how they change along the
@@ -124,7 +120,7 @@ static const slope_box nothing = {{FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX}};
 
 /* False if no ray of the tile has a part to be traced: no Gaussian needs to be listed then. The slopes of a
    part of the tile include all of its rays nevertheless, so that depths round as those of whole rays. */
-static bool tile_sees(const ray_image *rays, size_t tile)
+static bool tile_has_traced_ray(const ray_image *rays, size_t tile)
 {
     const pixel_range at = tile_pixels(rays, tile);
     if (rays->near == NULL)
@@ -142,7 +138,7 @@ typedef struct face_job {
     list_builder *lists;
     const ray_image *rays;
     uint8_t *tile_faces; /* list_builder.tile_faces */
-    atomic_bool apart;
+    atomic_bool needs_six_faces;
 } face_job;
 
 /* Box around the slopes of the part's rays; false when some are too far from the axis. */
@@ -162,7 +158,7 @@ static bool slopes_of_part(const list_view *view, const ray_image *rays, const l
             if (!ray_direction_is_sound(d) || !part_has_ray(view, part, d))
                 continue;
             const float w = dual[2][0] * d[0] + dual[2][1] * d[1] + dual[2][2] * d[2], inverse = 1 / w;
-            near = near && w > component_least;
+            near = near && w > AXIS_COMPONENT_MIN;
             for (int k = 0; k < 2; k++) {
                 const float s = (dual[k][0] * d[0] + dual[k][1] * d[1] + dual[k][2] * d[2]) * inverse;
                 box.low[k] = s < box.low[k] ? s : box.low[k];
@@ -189,11 +185,11 @@ static void find_slopes(size_t block, size_t begin, size_t end, void *context)
     (void)block;
     for (size_t i = begin; i < end; i++) {
         list_part *part = &view->parts[i];
-        part->sees = tile_sees(job->rays, part->tile);
+        part->has_traced_ray = tile_has_traced_ray(job->rays, part->tile);
         near = slopes_of_part(view, job->rays, part, &view->part_boxes[i]) && near;
     }
     if (!near)
-        atomic_store(&job->apart, true);
+        atomic_store(&job->needs_six_faces, true);
 }
 
 /* ---- six faces ---- */
@@ -230,9 +226,9 @@ static unsigned faces_of_tile(const list_frame *frame, const ray_image *rays, si
                 high[k] = component[k] > high[k] ? component[k] : high[k];
             }
         }
-    if (low[2] > component_least) /* all rays, or there are none */
+    if (low[2] > AXIS_COMPONENT_MIN) /* all rays, or there are none */
         return 1;
-    float most = component_least;
+    float most = AXIS_COMPONENT_MIN;
     unsigned best = 0;
     for (int f = 0; f < LIST_FACES; f++) {
         const int axis = (f / 2 + 2) % 3;
@@ -335,7 +331,8 @@ static void set_boxes(list_view *view, list_face *face)
             slope_box around = nothing;
             for (size_t lane = 0; lane < 16 && at < face->box16_count; lane++) {
                 const size_t part = 16 * at + lane;
-                const bool listed = part < face->part_count && view->parts[face->first_part + part].sees;
+                const bool listed =
+                    part < face->part_count && view->parts[face->first_part + part].has_traced_ray;
                 const slope_box *box = listed ? &view->part_boxes[face->first_part + part] : &nothing;
                 set_lane(&view->boxes16[face->first_box16 + at], lane, box);
                 widen(&around, box);
@@ -375,9 +372,9 @@ gbt_status list_faces_make(list_builder *lists, const ray_image *rays, bool *usa
     if (!*usable)
         return GBT_OK;
     GBT_TRY(parts_of_one(lists, tiles, err));
-    atomic_init(&job.apart, false);
+    atomic_init(&job.needs_six_faces, false);
     parallel_blocks(lists->view.part_count, 16, find_slopes, &job);
-    if (atomic_load(&job.apart)) {
+    if (atomic_load(&job.needs_six_faces)) {
         GBT_TRY(parts_of_six(&job, tiles, err));
         parallel_blocks(lists->view.part_count, 16, find_slopes, &job);
     }

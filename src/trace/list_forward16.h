@@ -91,7 +91,7 @@ static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet
     row_queue queue = {.count = 0};
     rows->count = 0;
     for (size_t first = 0; first < list->count; first += 16) {
-        const unsigned bits = rows_in_packet(list, first, &p->slopes);
+        const unsigned bits = gaussians_in_packet(list, first, &p->slopes);
         queue.count += vmask16_numbers(vmask16_from_bits(bits), (uint32_t)first, queue.number + queue.count);
         const bool last = first + 16 >= list->count;
         if (queue.count < 16 && !last)
@@ -116,15 +116,15 @@ static PASS void gather_rows(const packet_pass *p, const tile_list *list, packet
 
 /* Writes into entries `begin` .. `end` of a packet past how many entries each row steps back. A row without
    an entry passes that on to the entry of the next row, which may then step back farther than it has to. */
-static void note_back(const packet_hits *rows, tape_entry *entries, size_t begin, size_t end)
+static void write_steps_back(const packet_hits *rows, tape_entry *entries, size_t begin, size_t end)
 {
     for (size_t k = 0; k < rows->back_count; k++) {
-        const uint32_t at = rows->kept[rows->back[k].place];
+        const uint32_t at = rows->tape_index[rows->back[k].place];
         if (at == end)
             break;
-        const uint32_t past = at - rows->kept[rows->back[k].place - rows->back[k].past];
-        const uint32_t told = past < TAPE_SORTED ? past : TAPE_SORTED;
-        entries[at].packet = (uint16_t)((entries[at].packet & (TILE_PACKETS - 1)) | told << TAPE_BACK);
+        const uint32_t steps = at - rows->tape_index[rows->back[k].place - rows->back[k].steps];
+        const uint32_t capped = steps < TAPE_SORTED ? steps : TAPE_SORTED;
+        entries[at].packet = (uint16_t)((entries[at].packet & (TILE_PACKETS - 1)) | capped << TAPE_BACK);
     }
     for (size_t k = begin; k < end && rows->crowded; k++)
         entries[k].packet |= TAPE_SORTED << TAPE_BACK;
@@ -144,7 +144,7 @@ static PASS bool blend_list(const packet_pass *p, const tile_list *list, const p
              rgb[3] = {zero, zero, zero};
     const packet_hits copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
-    size_t kept = tape != NULL ? tape->count : 0;
+    size_t entry_count = tape != NULL ? tape->count : 0;
     packet_extra extra;
     if (scene->extra)
         start_extra(&extra);
@@ -172,21 +172,21 @@ static PASS bool blend_list(const packet_pass *p, const tile_list *list, const p
         hits += (uint64_t)__builtin_popcount(vmask16_bits(hit));
         blended += (uint64_t)__builtin_popcount(bits);
         if (tape != NULL) {
-            rows->kept[i] = (uint32_t)kept;
-            entries[kept] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
-            kept += bits != 0;
+            rows->tape_index[i] = (uint32_t)entry_count;
+            entries[entry_count] = (tape_entry){g->pair & ~PAIR_GENERAL, (uint16_t)bits, packet};
+            entry_count += bits != 0;
         }
     }
     if (tape != NULL) {
-        note_back(from, tape->entries, tape->count, kept);
-        tape->count = kept;
+        write_steps_back(from, tape->entries, tape->count, entry_count);
+        tape->count = entry_count;
     }
     if (tape != NULL && one_order)
         vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
-    counters->pairs += rows->steps;
+    counters->order_steps += rows->steps;
     counters->spilled_packets += rows->crowded;
     for (int c = 0; c < 3; c++)
         vfloat16_store(out->rgb[c], vfloat16_fma(lowest, vfloat16_load(rays->background[c]), rgb[c]));

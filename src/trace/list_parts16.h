@@ -47,7 +47,7 @@ static inline vfloat16 clamp_to(vfloat16 a, vfloat16 low, vfloat16 high)
     return vfloat16_min(vfloat16_max(a, low), high);
 }
 
-/* Which boxes the ellipse reaches into, found as in rows_in_packet() of list16.h. */
+/* Which boxes the ellipse reaches into, found as in gaussians_in_packet() of list16.h. */
 static inline vmask16 ellipse_meets(const boxes_about *b, const float c[3])
 {
     const vfloat16 zero = vfloat16_set1(0), near_x = clamp_to(zero, b->left, b->right),
@@ -71,7 +71,7 @@ static size_t find_parts(const list_view *view, const list_face *face, size_t re
         for (size_t i = face->first_part; i < face->first_part + face->part_count; i++) {
             const slope_box *box = &view->part_boxes[i];
             parts[count] = (uint32_t)i;
-            count += view->parts[i].sees && box->low[0] <= box->high[0] &&
+            count += view->parts[i].has_traced_ray && box->low[0] <= box->high[0] &&
                      ellipsoid_meets_box(&shape->ellipsoid, box);
         }
         return count;

@@ -50,9 +50,9 @@ static inline unsigned visible_lanes(const kernel_scene *scene, const gaussians 
     for (unsigned i = 0; i < 16 && first + i < end; i++) {
         const size_t at = first + i;
         const float color = g->red[at] + g->green[at] + g->blue[at],
-                    turn = g->quat_w[at] * g->quat_w[at] + g->quat_x[at] * g->quat_x[at] +
-                           g->quat_y[at] * g->quat_y[at] + g->quat_z[at] * g->quat_z[at],
-                    size = (1 + 4 * turn) * (g->scale_x[at] + g->scale_y[at] + g->scale_z[at]),
+                    quat_norm2 = g->quat_w[at] * g->quat_w[at] + g->quat_x[at] * g->quat_x[at] +
+                                 g->quat_y[at] * g->quat_y[at] + g->quat_z[at] * g->quat_z[at],
+                    size = (1 + 4 * quat_norm2) * (g->scale_x[at] + g->scale_y[at] + g->scale_z[at]),
                     reach = fabsf(g->mean_x[at]) + fabsf(g->mean_y[at]) + fabsf(g->mean_z[at]) + 10 * size;
         if (g->opacity[at] <= scene->settings.alpha_min)
             continue;

@@ -29,7 +29,7 @@ enum { STEPS_PER_ROW = 48, STEPS_FREE = 1024 };
 
 /* The place of a row, and how many rows it steps back past. */
 typedef struct row_back {
-    uint32_t place, past;
+    uint32_t place, steps;
 } row_back;
 
 /* The hits of a packet: arrays of rows, PACKET_LANES floats each; sixteen more than `count` have memory. */
@@ -43,8 +43,9 @@ typedef struct packet_hits {
     /* Adjoint only. By place: T alpha g . color, and the sum of it over the hits behind, with two spare rows
        after the last. By row: 1 / den of its response. */
     float *term, *behind, *inverse;
-    uint32_t *kept; /* by place. Forward: how many entries the tape has in front of it; adjoint: the last
-                       place that it passes when it goes on */
+    /* By place: forward, how many entries the tape has in front of it; adjoint, the last place that it passes
+       when it goes on. The same memory. */
+    uint32_t *tape_index, *last_passed;
     row_back *back; /* forward only: the rows that step back past more than two, in their order */
     size_t back_count;
     uint32_t *order;  /* row */
@@ -77,7 +78,7 @@ static bool reserve_rows_of_list(list_scratch *scratch, size_t most, bool adjoin
     uint32_t *word = (uint32_t *)(void *)(at + n + 9); /* whole sixteens */
     out->order = word;
     out->number = word + n;
-    out->kept = word + 2 * n;
+    out->tape_index = out->last_passed = word + 2 * n;
     out->back = (row_back *)(void *)(word + 3 * n);
     out->back_count = 0;
     out->steps = 0; /* also what they are with packet_order, where nothing is inserted */
@@ -133,7 +134,7 @@ static inline __attribute__((always_inline)) void respond_together(const tile_ga
 /* The response by the general form of gaussian16.h. */
 static row_response respond_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id)
 {
-    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
+    const gaussian_lanes g = broadcast_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     ray_lanes ray;
     load_rays(rays, &ray);
     const response r = respond(&g, &ray, vfloat16_set1(scene->settings.t_near));

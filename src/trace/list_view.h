@@ -37,9 +37,9 @@ typedef struct slope_box {
 typedef struct list_part {
     uint32_t tile;
     uint8_t face;
-    bool whole; /* all of the tile's rays */
-    bool first; /* the first part of the tile: pixels without a ray belong to it */
-    bool sees;  /* some ray has a part to be traced (ray_image.near); else no Gaussian is listed */
+    bool whole;          /* all of the tile's rays */
+    bool first;          /* the first part of the tile: pixels without a ray belong to it */
+    bool has_traced_ray; /* some ray has a part to be traced (ray_image.near); else no Gaussian is listed */
 } list_part;
 
 /* Sixteen slope_box: lowest a, highest a, lowest b, highest b. */

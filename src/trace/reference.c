@@ -88,13 +88,13 @@ typedef struct hit_list {
 } hit_list;
 
 /* A ray, the limits within which it sees, and what the order of its hits depends on. */
-typedef struct sight {
+typedef struct reference_ray {
     double origin[3], dir[3], near, far;
     double T_front; /* ray_image.T_front */
     bool own_order; /* hits are sorted by their depth; else by packet_depth() of these, from one origin: */
     const ray_image *rays;
     size_t middle, packet[PACKET], packet_count; /* packet: its valid rays, from lane MIDDLE on */
-} sight;
+} reference_ray;
 
 static void ray_of(const ray_image *rays, size_t i, double origin[3], double dir[3])
 {
@@ -116,7 +116,7 @@ static double near_of(const ray_image *rays, size_t i)
 
 /* The key of a Gaussian in the one order of a packet's rays (packet_order); 0 if one of them hits it at
    t_near. */
-static double packet_depth(const prepared *p, const trace_settings *s, const sight *ray)
+static double packet_depth(const prepared *p, const trace_settings *s, const reference_ray *ray)
 {
     double origin[3], dir[3], v[3], near_by = 0;
     reference_hit middle = {.t = HUGE_VAL};
@@ -137,8 +137,8 @@ static double packet_depth(const prepared *p, const trace_settings *s, const sig
     return fmax(0.5 * near_by, fmin(middle.t, 2 * near_by));
 }
 
-static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s, const sight *ray,
-                         hit_list *list, gbt_error *err)
+static gbt_status gather(const prepared *all, size_t all_count, const trace_settings *s,
+                         const reference_ray *ray, hit_list *list, gbt_error *err)
 {
     const double *dir = ray->dir;
     list->count = 0;
@@ -195,7 +195,7 @@ static gbt_status prepare_all(const reference_scene *scene, const trace_settings
 
 /* Sets up ray i and, with packet_order, the rays of its 4 x 4 pixels. The middle one is in their second row
    and column or, if that is not a valid ray, the first that is. */
-static void see(const trace_settings *s, const ray_image *rays, size_t i, sight *out)
+static void make_reference_ray(const trace_settings *s, const ray_image *rays, size_t i, reference_ray *out)
 {
     const size_t width = (size_t)rays->width, x0 = i % width / SIDE * SIDE, y0 = i / width / SIDE * SIDE;
     ray_of(rays, i, out->origin, out->dir);
@@ -237,8 +237,8 @@ static void forward_block(size_t block, size_t begin, size_t end, void *context)
     hit_list list = {0};
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
         double transmittance;
-        sight ray;
-        see(job->s, job->rays, i, &ray);
+        reference_ray ray;
+        make_reference_ray(job->s, job->rays, i, &ray);
         job->status[block] = gather(job->all, job->scene->count, job->s, &ray, &list, NULL);
         const size_t n =
             blend(job->scene, job->s, &list, ray.dir, ray.T_front, job->rgb + 3 * i, &transmittance);
@@ -274,7 +274,7 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
 
 /* Chain from dL/dalpha of one hit to the fields of its Gaussian. */
 static void respond_backward(const reference_scene *scene, const prepared *p, const trace_settings *s,
-                             const sight *ray, size_t id, double d_alpha, double *d_gaussians)
+                             const reference_ray *ray, size_t id, double d_alpha, double *d_gaussians)
 {
     reference_hit hit;
     double v[3], q[4], scale[3];
@@ -310,7 +310,7 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
 /* Back to front: `behind` is the colour and `T_behind` the transmittance of everything behind a hit, so
    nothing is divided by 1 - alpha. */
 static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
-                         const sight *ray, const hit_list *list, const double d_rgb[3],
+                         const reference_ray *ray, const hit_list *list, const double d_rgb[3],
                          double d_transmittance, double *d_gaussians)
 {
     double rgb[3], T_left, behind[3], T_behind = 1;
@@ -341,8 +341,8 @@ gbt_status reference_scene_backward(const reference_scene *scene, const trace_se
     hit_list list = {0};
     gbt_status status = prepare_all(scene, s, &all, err);
     for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++) {
-        sight ray;
-        see(s, rays, i, &ray);
+        reference_ray ray;
+        make_reference_ray(s, rays, i, &ray);
         status = gather(all, scene->count, s, &ray, &list, err);
         if (status == GBT_OK)
             ray_backward(scene, all, s, &ray, &list, d_rgb + 3 * i,
@@ -358,7 +358,7 @@ gbt_status reference_scene_ray_hits(const reference_scene *scene, const trace_se
                                     size_t *count, size_t *capacity, gbt_error *err)
 {
     hit_list list = {*hits, 0, *capacity};
-    sight ray = {.far = HUGE_VAL, .T_front = 1, .own_order = true};
+    reference_ray ray = {.far = HUGE_VAL, .T_front = 1, .own_order = true};
     memcpy(ray.origin, origin, sizeof ray.origin);
     memcpy(ray.dir, dir, sizeof ray.dir);
     prepared *all = NULL;

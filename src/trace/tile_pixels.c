@@ -89,8 +89,8 @@ static void repeat_active(packet_rays *p, bool parts)
     }
 }
 
-/* Leaves active only the rays that belong to this part of the tile; `elsewhere`: the other pixels. */
-static void keep_part(const list_view *view, const list_part *part, packet_rays *p, uint16_t *elsewhere)
+/* Leaves active only the rays that belong to this part of the tile; `other_part`: the other pixels. */
+static void keep_part(const list_view *view, const list_part *part, packet_rays *p, uint16_t *other_part)
 {
     unsigned own = part->first ? ~p->active : 0;
     for (int lane = 0; lane < PACKET_LANES; lane++) {
@@ -98,7 +98,7 @@ static void keep_part(const list_view *view, const list_part *part, packet_rays 
         if (p->active >> lane & 1 && part_has_ray(view, part, d))
             own |= 1u << lane;
     }
-    *elsewhere = (uint16_t)~own;
+    *other_part = (uint16_t)~own;
     p->active &= own;
 }
 
@@ -118,9 +118,9 @@ void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int 
             for (int lane = 0; lane < PACKET_LANES; lane++)
                 if (lane_pixel(rays, x0, y0, packet, lane, &at))
                     load_ray(rays, at, lane, p);
-        out->elsewhere[packet] = 0;
+        out->other_part[packet] = 0;
         if (part != NULL && !part->whole)
-            keep_part(view, part, p, &out->elsewhere[packet]);
+            keep_part(view, part, p, &out->other_part[packet]);
         if (p->active != 0 && p->active != ALL_LANES)
             repeat_active(p, out->parts);
         if (p->active != 0)
@@ -183,7 +183,7 @@ void tile_store_pixels(const ray_image *rays, const kernel_scene *scene, const t
             continue;
         }
         for (int lane = 0; lane < PACKET_LANES; lane++)
-            if (lane_pixel(rays, x0, y0, packet, lane, &at) && !(tile->elsewhere[packet] >> lane & 1))
+            if (lane_pixel(rays, x0, y0, packet, lane, &at) && !(tile->other_part[packet] >> lane & 1))
                 store_pixel(rays, scene, to, at, active >> lane & 1 ? &out[packet] : NULL, lane);
     }
 }

@@ -328,7 +328,7 @@ gbt_status trace_forward(trace_scene *scene, const ray_image *rays, bool keep_ta
         counters->hits += c->hits;
         counters->blended += c->blended;
         counters->rows += c->rows;
-        counters->pairs += c->pairs;
+        counters->order_steps += c->order_steps;
         counters->spilled_packets += c->spilled_packets;
         counters->tape_bytes += hit_tape_bytes(&scene->tiles[i].tape);
     }

@@ -54,7 +54,7 @@ static bool add_turned(const tape_entry *entry, int count, const vfloat16 terms[
     vfloat16 of_entry[16];
     for (int k = 0; k < 16; k++)
         vfloat16_store(field[k], terms[k]), rows[k] = field[k];
-    vfloat16_load_turned(rows, of_entry);
+    vfloat16_load_transposed(rows, of_entry);
     for (int i = 0; i < 16 && i < count; i++) {
         gradient_record *g = gradient_list_find(out, entry[i].id);
         if (g == NULL)
@@ -97,8 +97,8 @@ static bool reserve_rows(int count, tree_scratch *scratch, adjoint_rows *out)
     at += groups;
     for (int f = 0; f < FIELD_COUNT; f++, at += wide)
         out->field[f] = at;
-    out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide, out->sorted.clear = at + 3 * wide,
-    out->sorted.T_front = at + 4 * wide;
+    out->term = at, out->after = at + wide, out->sorted.t = at + 2 * wide,
+    out->sorted.one_minus_alpha = at + 3 * wide, out->sorted.T_front = at + 4 * wide;
     at += 5 * wide;
     out->sorted.near = at, out->sorted.far_reached = at + n, out->row_near = at + 2 * n,
     out->row_far = at + 3 * n, out->row = (uint32_t *)(void *)(at + 4 * n);
@@ -171,7 +171,7 @@ static void replay_rows(const kernel_scene *scene, const packet_rays *rays, cons
         if (!done) {
             ray_lanes ray;
             load_rays(rays, &ray);
-            const gaussian_lanes g = spread_gaussian(record);
+            const gaussian_lanes g = broadcast_gaussian(record);
             response r = respond(&g, &ray, t_near);
             refine_point(&g, &ray, t_near, &r);
             t = r.t;
@@ -228,7 +228,7 @@ static bool add_rows(const tape_entry *entry, const adjoint_rows *o, int first, 
     for (int i = 0; i < 16; i++)
         rows[i] =
             o->field[FIELD_RAW] + (size_t)(first + (first + i < o->sorted.count ? i : 0)) * PACKET_LANES;
-    vfloat16_load_turned(rows, sum);
+    vfloat16_load_transposed(rows, sum);
     for (int k = 0; k < 9; k++)
         e[k / 3][k % 3] = vfloat16_load(group->axes[k]);
     turn_moments(e, sum + GRADIENT_V, sum + GRADIENT_VV, turned);
@@ -286,7 +286,7 @@ static void sum_rays(const kernel_scene *scene, const tape_entry *entry, const v
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = (int)o->row[first + k];
             const vmask16 blended = vfloat16_lt(row_load(o->sorted.t, first + k), infinite);
-            const vfloat16 share = vfloat16_div(sum[k], row_load(o->sorted.clear, first + k)),
+            const vfloat16 share = vfloat16_div(sum[k], row_load(o->sorted.one_minus_alpha, first + k)),
                            d_alpha = vfloat16_sub(row_load(o->field[FIELD_COLOR], row), share);
             const vfloat16 v[3] = {row_load(o->field[FIELD_V], row), row_load(o->field[FIELD_V + 1], row),
                                    row_load(o->field[FIELD_V + 2], row)};
@@ -330,7 +330,7 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
                         const float d_rgb_in[3][PACKET_LANES], const tape_entry *entry, int count,
                         gradient_list *out, tree_scratch *scratch)
 {
-    enum { RAW, V, COLOR = V + 3, OPACITY, CLEAR, TERM, T, BEHIND, FIELDS };
+    enum { RAW, V, COLOR = V + 3, OPACITY, ONE_MINUS_ALPHA, TERM, T, BEHIND, FIELDS };
     const size_t n = ((size_t)count + 15) & ~(size_t)15;
     if (mem_reserve((void **)&scratch->rows, &scratch->row_capacity, 0, FIELDS * n, sizeof(float),
                     "adjoint of a ray", NULL) != GBT_OK)
@@ -359,20 +359,20 @@ static bool ray_adjoint(const kernel_scene *scene, const packet_rays *rays, int 
             vfloat16_store(field[V + k] + first, r.v[k]);
         vfloat16_store(field[COLOR] + first, shown);
         vfloat16_store(field[OPACITY] + first, g.opacity);
-        vfloat16_store(field[CLEAR] + first, vfloat16_sub(one, alpha));
+        vfloat16_store(field[ONE_MINUS_ALPHA] + first, vfloat16_sub(one, alpha));
         vfloat16_store(field[TERM] + first, vfloat16_mul(alpha, shown));
     }
-    const float *clear = field[CLEAR], *term = field[TERM];
+    const float *one_minus_alpha = field[ONE_MINUS_ALPHA], *term = field[TERM];
     float *T_front = field[T], *behind_hit = field[BEHIND], transmittance = 1, behind = 0;
     for (int i = 0; i < count; i++) {
         T_front[i] = transmittance;
-        transmittance *= clear[i];
+        transmittance *= one_minus_alpha[i];
     }
     for (int c = 0; c < 3; c++)
         behind = fmaf(rays->background[c][lane], d_rgb_in[c][lane], behind);
     for (int i = count; i-- > 0;) {
         behind_hit[i] = behind;
-        behind = fmaf(clear[i], behind, term[i]);
+        behind = fmaf(one_minus_alpha[i], behind, term[i]);
     }
     for (int first = 0; first < count; first += 16) {
         vfloat16 v[3], terms[16];

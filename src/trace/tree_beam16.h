@@ -143,7 +143,7 @@ static bool make_beam(const packet_rays *rays, const kernel_scene *scene, tile_b
                 vfloat16_sub(vfloat16_load(rays[p].origin[axis]), vfloat16_set1(out->origin[axis]));
         const vfloat16 forward = dot_lanes(out->axis[2], dir);
         const float lowest = vfloat16_lowest(forward);
-        if (!(lowest > 0.3f))
+        if (!(lowest > AXIS_COMPONENT_MIN))
             return false;
         forward_low = smaller(forward_low, lowest),
         forward_high = larger(forward_high, vfloat16_highest(forward));
@@ -216,7 +216,7 @@ typedef struct ellipsoids16 {
 } ellipsoids16;
 
 /* a^T S b from the products of a and b (axis_products); S = xx yy zz yz zx xy. */
-static inline vfloat16 spread_dot(const vfloat16 s[6], const float product[6])
+static inline vfloat16 covariance_product(const vfloat16 s[6], const float product[6])
 {
     vfloat16 sum = vfloat16_mul(vfloat16_set1(product[0]), s[0]);
     for (int k = 1; k < 6; k++)
@@ -230,7 +230,7 @@ static inline void turn_ellipsoids(const tree_leaf *leaf, const tile_beam *b, el
     for (int axis = 0; axis < 3; axis++)
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(b->origin[axis]));
     for (int k = 0; k < 6; k++)
-        s[k] = vfloat16_load(leaf->spread[k]);
+        s[k] = vfloat16_load(leaf->covariance[k]);
     /* About ten roundings, 2^-22 together; test_ellipsoids() multiplies them by 1 + slope^2, 11 at most
        (make_beam). */
     const vfloat16 slack =
@@ -238,11 +238,11 @@ static inline void turn_ellipsoids(const tree_leaf *leaf, const tile_beam *b, el
     out->u = dot_lanes(b->axis[0], offset);
     out->v = dot_lanes(b->axis[1], offset);
     out->w = dot_lanes(b->axis[2], offset);
-    out->uu = vfloat16_add(spread_dot(s, b->square[0]), slack);
-    out->vv = vfloat16_add(spread_dot(s, b->square[1]), slack);
-    out->ww = spread_dot(s, b->square[2]);
-    out->uw = spread_dot(s, b->square[3]);
-    out->vw = spread_dot(s, b->square[4]);
+    out->uu = vfloat16_add(covariance_product(s, b->square[0]), slack);
+    out->vv = vfloat16_add(covariance_product(s, b->square[1]), slack);
+    out->ww = covariance_product(s, b->square[2]);
+    out->uw = covariance_product(s, b->square[3]);
+    out->vw = covariance_product(s, b->square[4]);
 }
 
 /* Which of the ellipsoids reach into the four planes: n.c - limit <= sqrt(n^T S n). */

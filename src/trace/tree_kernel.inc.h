@@ -129,10 +129,10 @@ static bool blend_rows(packet_rows *p, int packet, const kernel_scene *scene, co
         vfloat16 T[ROW_BLOCK];
         move_window(&o->sorted, first, &window);
         window_transmittance(&o->sorted, first, &window, T);
-        counters->pairs += (uint64_t)((window.high - window.low) * ROW_BLOCK);
+        counters->order_steps += (uint64_t)((window.high - window.low) * ROW_BLOCK);
         for (int k = 0; k < ROW_BLOCK && first + k < count; k++) {
             const int row = o->row[first + k];
-            const vfloat16 next = vfloat16_mul(T[k], row_load(o->clear, first + k));
+            const vfloat16 next = vfloat16_mul(T[k], row_load(o->one_minus_alpha, first + k));
             const vmask16 hit = vmask16_and(vfloat16_lt(row_load(o->t, first + k), infinite), p->alive);
             const vmask16 stop = vmask16_and(hit, vfloat16_lt(next, stop_at)),
                           blend = vmask16_andnot(stop, hit);
@@ -175,7 +175,7 @@ typedef struct tile_state {
     int waiting_count;
     /* the candidates that the packets are taking */
     _Alignas(64) float nearest[CHUNK_CAPACITY];
-    _Alignas(64) float bound[8][CHUNK_CAPACITY]; /* slopes, or centre and spread in the tile's frame */
+    _Alignas(64) float bound[8][CHUNK_CAPACITY]; /* slopes, or centre and covariance in the tile's frame */
     uint32_t id[CHUNK_CAPACITY];
     uint16_t in_front[CHUNK_CAPACITY / 16]; /* bit per candidate that view_form16.h may evaluate */
     int count;
@@ -285,7 +285,7 @@ static inline void evaluate(tile_state *s, const kernel_scene *scene, const pack
         append_row(rows, id, r.t, view_alpha(view, number % 16, r.exponent), &scene->settings, counters);
         return;
     }
-    const gaussian_lanes g = spread_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
+    const gaussian_lanes g = broadcast_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
     ray_lanes ray;
     load_rays(rays, &ray);
     const response r = respond(&g, &ray, vfloat16_set1(scene->settings.t_near));

@@ -179,15 +179,15 @@ static inline unsigned walk_leaf(const ray_walk *w, const tree_leaf *leaf)
     for (int axis = 0; axis < 3; axis++)
         offset[axis] = vfloat16_sub(vfloat16_load(leaf->mean[axis]), vfloat16_set1(w->origin[axis]));
     for (int k = 0; k < 6; k++)
-        s[k] = vfloat16_load(leaf->spread[k]);
-    /* 1.001: see make_walk(); 2^-18: the rounding of spread, as in turn_ellipsoids() */
+        s[k] = vfloat16_load(leaf->covariance[k]);
+    /* 1.001: see make_walk(); 2^-18: the rounding of covariance, as in turn_ellipsoids() */
     const vfloat16 grow = vfloat16_set1(1.001f),
                    slack = vfloat16_fma(vfloat16_set1(0x1p-18f), vfloat16_add(s[0], vfloat16_add(s[1], s[2])),
                                         vfloat16_set1(w->open));
     const vfloat16 x = dot_lanes(w->across[0], offset), y = dot_lanes(w->across[1], offset),
-                   xx = vfloat16_fma(grow, spread_dot(s, w->square[0]), slack),
-                   yy = vfloat16_fma(grow, spread_dot(s, w->square[1]), slack),
-                   xy = vfloat16_mul(grow, spread_dot(s, w->square[2]));
+                   xx = vfloat16_fma(grow, covariance_product(s, w->square[0]), slack),
+                   yy = vfloat16_fma(grow, covariance_product(s, w->square[1]), slack),
+                   xy = vfloat16_mul(grow, covariance_product(s, w->square[2]));
     const vfloat16 cross = vfloat16_mul(vfloat16_mul(x, y), xy),
                    form = vfloat16_fma(
                        vfloat16_mul(x, x), yy,

@@ -36,9 +36,9 @@ typedef struct packet_rows {
 /* Rows in the order of their nearest depth, whole vectors of PACKET_LANES; ROW_BLOCK more rows follow the
    last, so that blocks are whole. */
 typedef struct sorted_rows {
-    float *t, *clear;          /* depth, infinity where there is no hit; 1 - alpha, 1 there */
-    float *T_front;            /* T in front of row i if all rows before it were in front */
-    float *near, *far_reached; /* one number per row: nearest depth; largest depth of rows 0..i */
+    float *t, *one_minus_alpha; /* depth, infinity where there is no hit; 1 - alpha, 1 there */
+    float *T_front;             /* T in front of row i if all rows before it were in front */
+    float *near, *far_reached;  /* one number per row: nearest depth; largest depth of rows 0..i */
     int count;
 } sorted_rows;
 
@@ -70,13 +70,13 @@ static inline float row_depths(const float *t, int count, float *near, float *fa
 
 /* Places row `i` of the order, after row i - 1. `product` and `reached` run along: transmittance in front of
    the row, farthest depth so far. */
-static inline void place_row(sorted_rows *o, int i, vfloat16 t, vfloat16 clear, float near, float far,
-                             vfloat16 *product, float *reached)
+static inline void place_row(sorted_rows *o, int i, vfloat16 t, vfloat16 one_minus_alpha, float near,
+                             float far, vfloat16 *product, float *reached)
 {
     row_store(o->t, i, t);
-    row_store(o->clear, i, clear);
+    row_store(o->one_minus_alpha, i, one_minus_alpha);
     row_store(o->T_front, i, *product);
-    *product = vfloat16_mul(*product, clear);
+    *product = vfloat16_mul(*product, one_minus_alpha);
     *reached = larger(*reached, far);
     o->near[i] = near;
     o->far_reached[i] = *reached;
@@ -86,7 +86,7 @@ static inline void end_rows(sorted_rows *o)
 {
     for (int i = o->count; i < o->count + ROW_BLOCK; i++) {
         row_store(o->t, i, vfloat16_set1(INFINITY));
-        row_store(o->clear, i, vfloat16_set1(1));
+        row_store(o->one_minus_alpha, i, vfloat16_set1(1));
         o->near[i] = INFINITY;
     }
 }
@@ -112,21 +112,21 @@ static inline void window_transmittance(const sorted_rows *o, int first, const r
         t[k] = row_load(o->t, first + k);
     }
     for (int j = w->low; j < first; j++) {
-        const vfloat16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
+        const vfloat16 tj = row_load(o->t, j), one_minus_alpha = row_load(o->one_minus_alpha, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            T[k] = vfloat16_mul_where(vfloat16_le(tj, t[k]), T[k], clear);
+            T[k] = vfloat16_mul_where(vfloat16_le(tj, t[k]), T[k], one_minus_alpha);
     }
     for (int j = 0; j < ROW_BLOCK; j++) {
-        const vfloat16 clear = row_load(o->clear, first + j);
+        const vfloat16 one_minus_alpha = row_load(o->one_minus_alpha, first + j);
         for (int k = 0; k < ROW_BLOCK; k++)
             if (j != k)
                 T[k] = vfloat16_mul_where(j < k ? vfloat16_le(t[j], t[k]) : vfloat16_lt(t[j], t[k]), T[k],
-                                          clear);
+                                          one_minus_alpha);
     }
     for (int j = first + ROW_BLOCK; j < w->high; j++) {
-        const vfloat16 tj = row_load(o->t, j), clear = row_load(o->clear, j);
+        const vfloat16 tj = row_load(o->t, j), one_minus_alpha = row_load(o->one_minus_alpha, j);
         for (int k = 0; k < ROW_BLOCK; k++)
-            T[k] = vfloat16_mul_where(vfloat16_lt(tj, t[k]), T[k], clear);
+            T[k] = vfloat16_mul_where(vfloat16_lt(tj, t[k]), T[k], one_minus_alpha);
     }
 }
 
@@ -163,7 +163,7 @@ static inline void window_behind(const sorted_rows *o, int first, const row_wind
 
 typedef struct round_rows {
     _Alignas(64) float t[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES],
-        clear[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
+        one_minus_alpha[(ROW_CAPACITY + ROW_BLOCK) * PACKET_LANES];
     _Alignas(64) float T_front[ROW_CAPACITY * PACKET_LANES];
     _Alignas(64) float row_near[ROW_CAPACITY], row_far[ROW_CAPACITY]; /* in the packet's own order of rows */
     _Alignas(64) float key[ROW_CAPACITY];
@@ -211,7 +211,7 @@ static inline void order_rows(const packet_rows *p, float horizon, round_rows *o
         o->key[n] = o->row_near[i];
         n += o->row_near[i] < horizon;
     }
-    o->sorted = (sorted_rows){o->t, o->clear, o->T_front, o->near, o->far_reached, n};
+    o->sorted = (sorted_rows){o->t, o->one_minus_alpha, o->T_front, o->near, o->far_reached, n};
     const bool tied = rank_keys(o->key, n, o->row);
     for (int i = 0; i < n; i++)
         o->row[i] = rows[o->row[i]];
@@ -236,8 +236,9 @@ static inline void arrange_rows(const packet_rows *p, float horizon, round_rows 
         const int row = o->row[i];
         const vfloat16 t = row_load(p->t, row);
         const vmask16 now = vfloat16_lt(t, limit);
-        const vfloat16 clear = vfloat16_select(now, vfloat16_sub(one, row_load(p->alpha, row)), one);
-        place_row(&o->sorted, i, vfloat16_select(now, t, infinite), clear, o->row_near[row],
+        const vfloat16 one_minus_alpha =
+            vfloat16_select(now, vfloat16_sub(one, row_load(p->alpha, row)), one);
+        place_row(&o->sorted, i, vfloat16_select(now, t, infinite), one_minus_alpha, o->row_near[row],
                   smaller(o->row_far[row], horizon), &product, &reached);
     }
     end_rows(&o->sorted);

@@ -468,7 +468,7 @@ static void rows_are_in_exact_order(void **state)
 {
     (void)state;
     enum { COUNT = 90 };
-    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], clear[(COUNT + ROW_BLOCK) * 16],
+    static _Alignas(64) float t[(COUNT + ROW_BLOCK) * 16], one_minus_alpha[(COUNT + ROW_BLOCK) * 16],
         before[(COUNT + 1) * 16], term[(COUNT + ROW_BLOCK) * 16];
     static _Alignas(64) float after[(COUNT + 1) * 16];
     static float near[COUNT + ROW_BLOCK], far_reached[COUNT], start[COUNT];
@@ -497,7 +497,7 @@ static void rows_are_in_exact_order(void **state)
             for (int lane = 0; lane < 16; lane++) {
                 const float depth = raw[order[i]][lane];
                 t[16 * i + lane] = depth,
-                           clear[16 * i + lane] =
+                           one_minus_alpha[16 * i + lane] =
                                isinf(depth) ? 1
                                             : 0.3f + 0.6f * rng_uniform(round, 3, (uint64_t)(16 * i + lane));
                 term[16 * i + lane] = isinf(depth) ? 0 : rng_uniform(round, 4, (uint64_t)(16 * i + lane));
@@ -507,9 +507,9 @@ static void rows_are_in_exact_order(void **state)
             reached = fmaxf(reached, far);
             far_reached[i] = reached;
             row_store(before, i, product);
-            product = vfloat16_mul(product, row_load(clear, i));
+            product = vfloat16_mul(product, row_load(one_minus_alpha, i));
         }
-        sorted_rows o = {t, clear, before, near, far_reached, COUNT};
+        sorted_rows o = {t, one_minus_alpha, before, near, far_reached, COUNT};
         end_rows(&o);
         vfloat16 behind = vfloat16_set1(0.25f);
         row_store(after, COUNT, behind);
@@ -534,7 +534,7 @@ static void rows_are_in_exact_order(void **state)
                     qsort(hits, (size_t)n, sizeof *hits, by_depth);
                     double want = 1, want_behind = 0.25;
                     for (; hits[at].row != first + k; at++)
-                        want *= (double)clear[16 * hits[at].row + lane];
+                        want *= (double)one_minus_alpha[16 * hits[at].row + lane];
                     for (int i = at + 1; i < n; i++)
                         want_behind += (double)term[16 * hits[i].row + lane];
                     _Alignas(64) float got[2][16];

@@ -19,13 +19,13 @@ static void write_tape(const packet_hits *rows, tape_entry *entry)
     forward.count = rows->count;
     for (int i = 0; i < (int)rows->count; i++) {
         const vfloat16 alpha = row_load(rows->alpha, i);
-        forward.order[i] = forward.kept[i] = (uint32_t)i;
+        forward.order[i] = forward.tape_index[i] = (uint32_t)i;
         row_store(forward.t, i, row_load(rows->t, i));
         row_store(forward.alpha, i, alpha);
         entry[i] = (tape_entry){0, (uint16_t)vmask16_bits(vfloat16_lt(vfloat16_set1(0), alpha)), 0};
     }
     insert_rows(&forward);
-    note_back(&forward, entry, 0, rows->count);
+    write_steps_back(&forward, entry, 0, rows->count);
     assert_false(forward.crowded);
     list_scratch_free(&scratch);
 }

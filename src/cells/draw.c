@@ -30,8 +30,8 @@ static void add_cell(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         for (size_t c = 0; c < 3; c++)
             p->out->pixels[3 * i + c] += d->part.pixels[3 * i + c];
-        d->rays.T_front[i] = d->left[i];
-        d->over[i] |= d->ended[i];
+        d->rays.T_front[i] = d->T_behind[i];
+        d->stopped[i] |= d->stopped_here[i];
     }
 }
 
@@ -49,7 +49,7 @@ static gbt_status draw_cell(const picture *p, gbt_error *err)
         return GBT_OK;
     d->drawn_cells++;
     GBT_TRY(trace_build(&d->scene, &d->load.sorted, &d->settings, ray_image_reach(&d->rays), err));
-    const trace_outputs wanted = {.rgb = &d->part, .transmittance = d->left, .ended = d->ended};
+    const trace_outputs wanted = {.rgb = &d->part, .transmittance = d->T_behind, .ended = d->stopped_here};
     GBT_TRY(trace_forward(&d->scene, &d->rays, false, &wanted, NULL, err));
     parallel_blocks(ray_image_count(&d->rays), RAY_BLOCK, add_cell, (void *)p);
     return GBT_OK;
@@ -111,9 +111,9 @@ gbt_status cell_draw(cell_drawer *d, const cell_store *store, const ray_shot *sh
 void cell_drawer_free(cell_drawer *d)
 {
     ray_image_free(&d->rays);
-    mem_free(d->over);
-    mem_free(d->ended);
-    mem_free(d->left);
+    mem_free(d->stopped);
+    mem_free(d->stopped_here);
+    mem_free(d->T_behind);
     mem_free(d->visible);
     image_free(&d->part);
     trace_scene_free(&d->scene);

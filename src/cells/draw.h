@@ -36,19 +36,19 @@ typedef struct cell_share {
 /** All that cell_draw() needs, from view to view. Start from {0}; end with cell_drawer_free(). */
 typedef struct cell_drawer {
     const cell_store *store;
-    size_t cell_bytes;  /* set before drawing: most bytes of one cell; 0, the default: as `memory` allows */
-    cell_share share;   /* set before drawing; a share has no background */
-    const float *enter; /* set before drawing: [pixels] transmittance that rays have in front of the share, 0:
-                           not drawn; NULL, the default: all have 1 */
-    size_t first, end;  /* the chunks of the share, in their order front to back */
-    size_t memory;      /* bytes that this process may take */
-    size_t budget;      /* of these, for one cell */
-    float variance;     /* of a pixel, px^2; 0: thin rays */
+    size_t cell_bytes; /* set before drawing: most bytes of one cell; 0, the default: as `memory` allows */
+    cell_share share;  /* set before drawing; a share has no background */
+    const float *share_T_front; /* set before drawing: [pixels] transmittance that rays have in front of the
+                           share, 0: not drawn; NULL, the default: all have 1 */
+    size_t first, end;          /* the chunks of the share, in their order front to back */
+    size_t memory;              /* bytes that this process may take */
+    size_t budget;              /* of these, for one cell */
+    float variance;             /* of a pixel, px^2; 0: thin rays */
     trace_settings settings;
-    ray_image rays;              /* `near`, `far` and `T_front` are those of the cell being drawn */
-    unsigned char *over, *ended; /* [rays] 1: transmittance_min has ended the ray; it ended it in this cell */
-    float *left;                 /* [rays] transmittance behind this cell */
-    image part;                  /* of this cell */
+    ray_image rays;                        /* `near`, `far` and `T_front` are those of the cell being drawn */
+    unsigned char *stopped, *stopped_here; /* [rays] 1: transmittance_min has ended the ray; in this cell */
+    float *T_behind;                       /* [rays] transmittance behind this cell */
+    image part;                            /* of this cell */
     view_bounds bounds;
     visible_reach reach;
     footprint_view view;

@@ -34,7 +34,7 @@ static void unpack_rows(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         const float *row = job->load->raw + i * store->row_floats;
         for (size_t k = 0; k < 3; k++)
-            cloud->mean[3 * i + k] = (float)((double)row[CELL_ROW_MEAN + k] - store->middle[k]);
+            cloud->mean[3 * i + k] = (float)((double)row[CELL_ROW_MEAN + k] - store->origin[k]);
         memcpy(cloud->scale_log + 3 * i, row + CELL_ROW_SCALE, 3 * sizeof *row);
         memcpy(cloud->quat + 4 * i, row + CELL_ROW_QUAT, 4 * sizeof *row);
         cloud->opacity[i] = row[CELL_ROW_OPACITY];
@@ -259,7 +259,7 @@ static void place_rows(size_t block, size_t begin, size_t end, void *context)
 }
 
 /* Whether there are so many rows that it is not worth reading them to see which are visible. */
-static bool is_far_too_much(const cell_drawer *d, const cell_part *part)
+static bool is_far_over_budget(const cell_drawer *d, const cell_part *part)
 {
     size_t rows = 0;
     for (size_t i = 0; i < d->visible_count; i++) {
@@ -272,7 +272,7 @@ static bool is_far_too_much(const cell_drawer *d, const cell_part *part)
 gbt_status cell_load_part(cell_drawer *d, const cell_part *part, bool *fits, gbt_error *err)
 {
     cell_load *load = &d->load;
-    *fits = cell_is_chunk(d->store, part) || !is_far_too_much(d, part);
+    *fits = cell_is_chunk(d->store, part) || !is_far_over_budget(d, part);
     if (!*fits)
         return GBT_OK;
     GBT_TRY(reserve(d, err));

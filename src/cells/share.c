@@ -11,8 +11,8 @@
 
 typedef struct share_walk {
     cell_drawer *d;
-    const size_t *weight; /* [chunk_count] */
-    size_t before, total; /* of the weights */
+    const size_t *weight;   /* [chunk_count] */
+    size_t in_front, total; /* of the weights */
 } share_walk;
 
 /* Visits the chunks from the eye on. A chunk belongs to the share whose part of the summed weights holds the
@@ -23,9 +23,9 @@ static void walk_part(share_walk *w, const cell_part *part)
     cell_drawer *d = w->d;
     if (cell_is_chunk(d->store, part)) {
         const size_t count = (size_t)d->share.count, last = count - 1,
-                     wanted = w->total > 0 ? w->before * count / w->total : 0,
+                     wanted = w->total > 0 ? w->in_front * count / w->total : 0,
                      of = wanted < last ? wanted : last;
-        w->before += w->weight[part->node - (d->store->chunk_count - 1)];
+        w->in_front += w->weight[part->node - (d->store->chunk_count - 1)];
         d->first += of < (size_t)d->share.index;
         d->end += of <= (size_t)d->share.index;
         return;
@@ -59,13 +59,13 @@ gbt_status cell_share_find(cell_drawer *d, gbt_error *err)
 
 /* ---- layers ---- */
 
-void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer)
+void cell_layer_make(const cell_drawer *d, const image *drawn, float *layer)
 {
     for (size_t i = 0; i < ray_image_count(&d->rays); i++) {
         float *out = layer + i * CELL_LAYER_FLOATS;
         for (size_t c = 0; c < 3; c++)
             out[c] = drawn->pixels[3 * i + c];
-        out[3] = d->over[i] != 0 ? -d->rays.T_front[i] : d->rays.T_front[i];
+        out[3] = d->stopped[i] != 0 ? -d->rays.T_front[i] : d->rays.T_front[i];
     }
 }
 
@@ -73,33 +73,34 @@ void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer)
    it ends earlier in this layer than it did when the layer was drawn alone: the layer is then left out here,
    and drawn again. */
 void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
-                       float *sum, float *enter)
+                       float *sum, float *share_T_front)
 {
-    memset(enter, 0, (size_t)count * pixels * sizeof *enter);
+    memset(share_T_front, 0, (size_t)count * pixels * sizeof *share_T_front);
     for (size_t i = 0; i < pixels; i++) {
-        float *out = sum + i * CELL_LAYER_FLOATS, through = 1;
-        bool over = false;
+        float *out = sum + i * CELL_LAYER_FLOATS, transmittance = 1;
+        bool stopped = false;
         out[0] = out[1] = out[2] = 0;
-        for (int k = 0; k < count && !over; k++) {
+        for (int k = 0; k < count && !stopped; k++) {
             const float *in = layers[k] + i * CELL_LAYER_FLOATS;
-            over = in[3] < 0 || through * in[3] < transmittance_min;
-            if (over && through < 1) {
-                enter[(size_t)k * pixels + i] = through;
+            stopped = in[3] < 0 || transmittance * in[3] < transmittance_min;
+            if (stopped && transmittance < 1) {
+                share_T_front[(size_t)k * pixels + i] = transmittance;
                 break;
             }
             for (size_t c = 0; c < 3; c++)
-                out[c] += through * in[c];
-            through *= fabsf(in[3]);
+                out[c] += transmittance * in[c];
+            transmittance *= fabsf(in[3]);
         }
-        out[3] = through;
+        out[3] = transmittance;
     }
 }
 
-void cell_layers_add(const float *const again[], int count, size_t pixels, const float *enter, float *sum)
+void cell_layers_add(const float *const again[], int count, size_t pixels, const float *share_T_front,
+                     float *sum)
 {
     for (int k = 0; k < count; k++)
         for (size_t i = 0; i < pixels; i++) {
-            if (!(enter[(size_t)k * pixels + i] > 0))
+            if (!(share_T_front[(size_t)k * pixels + i] > 0))
                 continue;
             const float *in = again[k] + i * CELL_LAYER_FLOATS;
             float *out = sum + i * CELL_LAYER_FLOATS;

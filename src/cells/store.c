@@ -99,7 +99,7 @@ static gbt_status reserve_blocks(sorting *s, gbt_error *err)
 /* ---- the tree ---- */
 
 /* A sample of the means: runs of rows all over the file. */
-static gbt_status take_sample(sorting *s, gbt_error *err)
+static gbt_status read_sample(sorting *s, gbt_error *err)
 {
     const size_t count = s->ply.count, wanted = (size_t)SAMPLE_BLOCKS * SAMPLE_ROWS;
     const size_t parts = count <= wanted ? parallel_block_count(count, SAMPLE_ROWS) : SAMPLE_BLOCKS;
@@ -261,15 +261,14 @@ static void make_local(sorting *s)
             low[k] = fmin(low[k], (double)store->chunks[i].low[k]);
             high[k] = fmax(high[k], (double)store->chunks[i].high[k]);
         }
-    gaussian_middle(s->sample, s->sample_count, low, high, store->middle);
-    memcpy(store->origin, store->middle, sizeof store->origin);
+    gaussian_middle(s->sample, s->sample_count, low, high, store->origin);
     for (size_t i = 0; i < store->chunk_count; i++)
         for (int k = 0; k < 3 && store->chunks[i].count > 0; k++) {
-            store->chunks[i].low[k] = (float)((double)store->chunks[i].low[k] - store->middle[k]);
-            store->chunks[i].high[k] = (float)((double)store->chunks[i].high[k] - store->middle[k]);
+            store->chunks[i].low[k] = (float)((double)store->chunks[i].low[k] - store->origin[k]);
+            store->chunks[i].high[k] = (float)((double)store->chunks[i].high[k] - store->origin[k]);
         }
     for (size_t i = 0; i + 1 < store->chunk_count; i++)
-        store->cuts[i].at = (float)((double)store->cuts[i].at - store->middle[store->cuts[i].axis]);
+        store->cuts[i].at = (float)((double)store->cuts[i].at - store->origin[store->cuts[i].axis]);
 }
 
 static gbt_status sort_rows(sorting *s, gbt_error *err)
@@ -323,7 +322,7 @@ gbt_status cell_store_make(const char *ply, const char *folder, size_t memory, s
     if (status == GBT_OK)
         status = plan(s, memory, chunk_rows, err);
     if (status == GBT_OK)
-        status = take_sample(s, err);
+        status = read_sample(s, err);
     if (status == GBT_OK) {
         cut_node(out, 0, s->sample, s->sample_count);
         status = large_file_scratch(folder, &out->rows, err);

@@ -44,7 +44,8 @@ typedef struct cell_cut {
 
 typedef struct cell_store {
     size_t count;     /* Gaussians */
-    double origin[3]; /* to be added to local coordinates */
+    double origin[3]; /* middle of the means, in the coordinates of the file; local coordinates are relative
+                         to it */
     int sh_degree;
     bool antialiased; /* as in gaussian_cloud */
     float near;
@@ -55,8 +56,6 @@ typedef struct cell_store {
     size_t extent_count, extent_capacity;
     size_t row_floats;
     large_file rows;
-    double middle[3]; /* middle of the means, in the coordinates of the file; local coordinates are relative
-                         to it */
 } cell_store;
 
 /**

@@ -12,12 +12,12 @@
 /* Strips are equal parts of the pixels. Counts are of floats. */
 typedef struct strips {
     int size;
-    size_t pixels, mine; /* of the picture, of the own strip */
-    float *layer;        /* [pixels][CELL_LAYER_FLOATS] of the own share */
-    float *layers;       /* [size][mine][CELL_LAYER_FLOATS] of all shares, in the own strip */
-    float *sum;          /* [mine][CELL_LAYER_FLOATS]; then [mine][3] */
-    float *enter;        /* [size][mine] */
-    float *enter_own;    /* [pixels] of the own share */
+    size_t pixels, mine;      /* of the picture, of the own strip */
+    float *layer;             /* [pixels][CELL_LAYER_FLOATS] of the own share */
+    float *layers;            /* [size][mine][CELL_LAYER_FLOATS] of all shares, in the own strip */
+    float *sum;               /* [mine][CELL_LAYER_FLOATS]; then [mine][3] */
+    float *share_T_front;     /* [size][mine] */
+    float *own_share_T_front; /* [pixels] of the own share */
     size_t whole[CLUSTER_SIZE_MAX], part[CLUSTER_SIZE_MAX]; /* of each strip; of the own strip */
     const float *layer_of[CLUSTER_SIZE_MAX];
 } strips;
@@ -35,8 +35,8 @@ static void free_strips(strips *s)
     mem_free(s->layer);
     mem_free(s->layers);
     mem_free(s->sum);
-    mem_free(s->enter);
-    mem_free(s->enter_own);
+    mem_free(s->share_T_front);
+    mem_free(s->own_share_T_front);
     mem_free(s);
 }
 
@@ -54,9 +54,9 @@ static gbt_status make_strips(size_t pixels, strips **out, gbt_error *err)
     s->layer = mem_alloc(pixels, LAYER, what, err);
     s->layers = mem_alloc(all, LAYER, what, err);
     s->sum = mem_alloc(s->mine + 1, LAYER, what, err);
-    s->enter = mem_alloc(all, sizeof *s->enter, what, err);
-    s->enter_own = mem_alloc(pixels, sizeof *s->enter_own, what, err);
-    const bool have = s->layer && s->layers && s->sum && s->enter && s->enter_own;
+    s->share_T_front = mem_alloc(all, sizeof *s->share_T_front, what, err);
+    s->own_share_T_front = mem_alloc(pixels, sizeof *s->own_share_T_front, what, err);
+    const bool have = s->layer && s->layers && s->sum && s->share_T_front && s->own_share_T_front;
     return have ? GBT_OK : GBT_ERR_NO_MEMORY;
 }
 
@@ -71,19 +71,19 @@ static void count_floats(strips *s, size_t of_pixel)
 
 static void exchange_layers(strips *s, const cell_drawer *d, const image *drawn)
 {
-    cell_layer_take(d, drawn, s->layer);
+    cell_layer_make(d, drawn, s->layer);
     count_floats(s, CELL_LAYER_FLOATS);
     cluster_exchange(s->layer, s->whole, s->layers, s->part);
 }
 
 /* @return whether any process has to draw anything again; the same for all */
-static bool exchange_enter(strips *s)
+static bool exchange_share_T_front(strips *s)
 {
     count_floats(s, 1);
-    cluster_exchange(s->enter, s->part, s->enter_own, s->whole);
+    cluster_exchange(s->share_T_front, s->part, s->own_share_T_front, s->whole);
     int32_t own = 0, all[CLUSTER_SIZE_MAX], any = 0;
     for (size_t i = 0; i < s->pixels; i++)
-        own |= s->enter_own[i] > 0;
+        own |= s->own_share_T_front[i] > 0;
     size_t ones[CLUSTER_SIZE_MAX];
     for (int k = 0; k < s->size; k++)
         ones[k] = 1;
@@ -117,14 +117,15 @@ gbt_status cell_draw_together(cell_drawer *d, const cell_store *store, const ray
     status = cluster_agree(status, err);
     if (status == GBT_OK) {
         exchange_layers(s, d, out);
-        cell_layers_blend(s->layer_of, s->size, s->mine, settings->transmittance_min, s->sum, s->enter);
-        if (exchange_enter(s)) {
-            d->enter = s->enter_own;
+        cell_layers_blend(s->layer_of, s->size, s->mine, settings->transmittance_min, s->sum,
+                          s->share_T_front);
+        if (exchange_share_T_front(s)) {
+            d->share_T_front = s->own_share_T_front;
             status = cluster_agree(cell_draw(d, store, shot, settings, variance, memory, out, err), err);
-            d->enter = NULL;
+            d->share_T_front = NULL;
             if (status == GBT_OK) {
                 exchange_layers(s, d, out);
-                cell_layers_add(s->layer_of, s->size, s->mine, s->enter, s->sum);
+                cell_layers_add(s->layer_of, s->size, s->mine, s->share_T_front, s->sum);
             }
         }
     }

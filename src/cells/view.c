@@ -36,7 +36,7 @@ static cell_part child_of(const cell_store *store, const cell_part *of, bool bel
 {
     const cell_cut *cut = &store->cuts[of->node];
     cell_part child = *of;
-    child.way[child.depth++] = (struct cell_way){cut->axis, cut->at, below};
+    child.half_space[child.depth++] = (struct cell_half_space){cut->axis, cut->at, below};
     child.node = 2 * of->node + (below ? 1 : 2);
     if (below)
         child.high[cut->axis] = cut->at;
@@ -72,16 +72,17 @@ static void cut_rays(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         float near = 0, far = INFINITY;
         for (int k = 0; k < job->part->depth; k++) {
-            const struct cell_way *way = &job->part->way[k];
-            const float along = rays->dir[3 * i + (size_t)way->axis];
-            const bool from_below = eye[way->axis] < way->at, crosses = from_below ? along > 0 : along < 0;
-            const float t = crosses ? (way->at - eye[way->axis]) / along : INFINITY;
-            if (way->below == from_below)
+            const struct cell_half_space *plane = &job->part->half_space[k];
+            const float along = rays->dir[3 * i + (size_t)plane->axis];
+            const bool from_below = eye[plane->axis] < plane->at,
+                       crosses = from_below ? along > 0 : along < 0;
+            const float t = crosses ? (plane->at - eye[plane->axis]) / along : INFINITY;
+            if (plane->below == from_below)
                 far = t < far ? t : far;
             else
                 near = t > near ? t : near;
         }
-        if (job->d->over[i] != 0)
+        if (job->d->stopped[i] != 0)
             far = 0;
         rays->near[i] = near;
         rays->far[i] = far;
@@ -104,8 +105,8 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
 {
     const size_t count = ray_image_count(&d->rays);
     ray_image *rays = &d->rays;
-    float **const floats[] = {&rays->near, &rays->far, &rays->T_front, &d->left};
-    unsigned char **const bytes[] = {&d->over, &d->ended};
+    float **const floats[] = {&rays->near, &rays->far, &rays->T_front, &d->T_behind};
+    unsigned char **const bytes[] = {&d->stopped, &d->stopped_here};
     if (d->part.width != rays->width || d->part.height != rays->height || rays->near == NULL) {
         image_free(&d->part);
         GBT_TRY(image_alloc(&d->part, rays->width, rays->height, 3, err));
@@ -123,8 +124,8 @@ static gbt_status reserve_rays(cell_drawer *d, gbt_error *err)
         }
     }
     for (size_t i = 0; i < count; i++) {
-        rays->T_front[i] = d->enter != NULL ? d->enter[i] : 1;
-        d->over[i] = !(rays->T_front[i] > 0);
+        rays->T_front[i] = d->share_T_front != NULL ? d->share_T_front[i] : 1;
+        d->stopped[i] = !(rays->T_front[i] > 0);
         rays->near[i] = 0;
         rays->far[i] = INFINITY;
     }

@@ -16,11 +16,11 @@ typedef struct cell_part {
     size_t node;
     float low[3], high[3]; /* may be infinite */
     int depth;
-    struct cell_way {
+    struct cell_half_space {
         int axis;
         float at;
         bool below; /* the part lies below this cut */
-    } way[CELL_DEPTH_MOST];
+    } half_space[CELL_DEPTH_MOST];
 } cell_part;
 
 cell_part cell_whole(void);
@@ -42,19 +42,20 @@ gbt_status cell_share_find(cell_drawer *d, gbt_error *err);
 enum { CELL_LAYER_FLOATS = 4 };
 
 /** Turns what has just been drawn, without a background, into a layer of [pixels][CELL_LAYER_FLOATS]. */
-void cell_layer_take(const cell_drawer *d, const image *drawn, float *layer);
+void cell_layer_make(const cell_drawer *d, const image *drawn, float *layer);
 
 /**
  * Blend layers, the first one in front; each was drawn as if nothing were in front of it.
  *
  * @param sum   [out] [pixels][CELL_LAYER_FLOATS] colour, and the transmittance behind it
- * @param enter [out] [count][pixels] > 0: the ray ends in this layer, which is not in `sum`. Draw the layer
- *                    again for rays that enter it with this transmittance (cell_drawer.enter), then call
- *                    cell_layers_add()
+ * @param share_T_front [out] [count][pixels] > 0: the ray ends in this layer, which is not in `sum`. Draw
+ *                    the layer again for rays that enter it with this transmittance
+ *                    (cell_drawer.share_T_front), then call cell_layers_add()
  */
 void cell_layers_blend(const float *const layers[], int count, size_t pixels, float transmittance_min,
-                       float *sum, float *enter);
-void cell_layers_add(const float *const again[], int count, size_t pixels, const float *enter, float *sum);
+                       float *sum, float *share_T_front);
+void cell_layers_add(const float *const again[], int count, size_t pixels, const float *share_T_front,
+                     float *sum);
 
 /** Restrict every ray to its interval in `part`. @return how many rays have one */
 size_t cell_view_cut(cell_drawer *d, const cell_part *part);

@@ -257,7 +257,7 @@ static void one_far_from_the_others(void **state)
     cloud.mean[3 * 700] = 1e9f;
     open_both(&b, &cloud);
     for (size_t k = 0; k < 3; k++)
-        assert_true(fabs(b.store.middle[k]) < 4);
+        assert_true(fabs(b.store.origin[k]) < 4);
     const gbt_camera camera = camera_at(8, 2, 1);
     check_same(&b, &camera, rounding);
     close_both(&b);
@@ -389,7 +389,7 @@ static double difference_of_shares(both *b, const ray_shot *shot, int count, siz
         next = b->drawer.end;
         cells += b->drawer.drawn_cells;
         layers[k] = malloc(PIXELS * CELL_LAYER_FLOATS * sizeof(float));
-        cell_layer_take(&b->drawer, &part, layers[k]);
+        cell_layer_make(&b->drawer, &part, layers[k]);
     }
     assert_int_equal(next, b->store.chunk_count);
     assert_true(cells >= (size_t)count);
@@ -399,13 +399,13 @@ static double difference_of_shares(both *b, const ray_shot *shot, int count, siz
         for (size_t i = 0; i < PIXELS; i++)
             *again += enter[(size_t)k * PIXELS + i] > 0;
         b->drawer.share = (cell_share){k, count};
-        b->drawer.enter = enter + (size_t)k * PIXELS;
+        b->drawer.share_T_front = enter + (size_t)k * PIXELS;
         assert_ok(cell_draw(&b->drawer, &b->store, shot, &b->settings, b->variance, plenty, &part, NULL));
-        cell_layer_take(&b->drawer, &part, layers[k]);
+        cell_layer_make(&b->drawer, &part, layers[k]);
     }
     cell_layers_add((const float *const *)layers, count, PIXELS, enter, sum);
     b->drawer.share = (cell_share){0};
-    b->drawer.enter = NULL;
+    b->drawer.share_T_front = NULL;
     double largest = 0;
     for (size_t i = 0; i < (size_t)3 * PIXELS; i++) {
         const float *at = sum + i / 3 * CELL_LAYER_FLOATS;

@@ -67,8 +67,8 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
         return false;
     const double edge = 0.5 - 0.5 * step; /* offset of the edge of the first pixel of `out` from that of
                                              `camera` */
-    *out = camera_reading(camera, x + edge, y + edge, (double)step * (camera->width / step),
-                          (double)step * (camera->height / step));
+    *out = camera_of_readout_part(camera, x + edge, y + edge, (double)step * (camera->width / step),
+                                  (double)step * (camera->height / step));
     out->width = camera->width / step;
     out->height = camera->height / step;
     /* The centre of pixel i of `out`, i + 0.5, is the centre of pixel x + step i of `camera`. */
@@ -84,7 +84,7 @@ bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_came
     const int center = camera_center_at(camera->model);
     if (center == 0)
         return false;
-    *out = camera_reading(camera, dx, dy, camera->width, camera->height);
+    *out = camera_of_readout_part(camera, dx, dy, camera->width, camera->height);
     out->params[center] -= dx;
     out->params[center + 1] -= dy;
     return true;
@@ -95,7 +95,7 @@ bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int h
     gbt_camera shifted;
     if (!gbt_camera_shifted(camera, x, y, &shifted))
         return false;
-    *out = camera_reading(&shifted, 0, 0, width, height);
+    *out = camera_of_readout_part(&shifted, 0, 0, width, height);
     out->width = width;
     out->height = height;
     return true;

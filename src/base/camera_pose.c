@@ -206,7 +206,7 @@ static void stand_at(const camera_pose *pose, gbt_camera *camera)
     memcpy(camera->center, pose->center, sizeof pose->center);
 }
 
-gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height)
+gbt_camera camera_of_readout_part(const gbt_camera *camera, double x, double y, double width, double height)
 {
     gbt_camera out = *camera;
     if (camera_is_still(camera))

@@ -52,7 +52,7 @@ bool camera_pixel(const gbt_camera *camera, const camera_lens *lens, const doubl
 
 /** The camera with the pose and motion that it has while a part of its image is read out: `width` x `height`
     pixels from (x, y) on, which may extend beyond the edges. */
-gbt_camera camera_reading(const gbt_camera *camera, double x, double y, double width, double height);
+gbt_camera camera_of_readout_part(const gbt_camera *camera, double x, double y, double width, double height);
 
 /**
  * Give `camera` a rolling shutter with the motion from `start` (time 0) to `end` (time 1) (camera_motion):

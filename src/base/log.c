@@ -137,10 +137,10 @@ void log_count(const char *stage, uint64_t done, uint64_t total, double psnr)
     const double seconds = clock_wall() - current.start;
     /* Without a listener nothing is printed at done = 0, and the end of a stage only completes an open
        progress line: its end has a message of its own. */
-    const bool tells =
+    const bool is_reported =
         ((done > 0 || listener != NULL) && is_due()) || (done == total && (listener != NULL || line_is_open));
     pthread_mutex_unlock(&lock);
-    if (!tells)
+    if (!is_reported)
         return;
     char line[LINE_SIZE];
     gbt_event e = {

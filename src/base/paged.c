@@ -31,8 +31,8 @@ static mapping *mappings; /* sorted by `start` */
 static size_t mapping_capacity;
 static atomic_size_t mapping_count;
 static atomic_size_t resident_limit; /* 0: not started */
-static atomic_size_t let_go_above;   /* threshold for paging out: the limit, or slightly more than what cannot
-                                        be paged out if that is larger */
+static atomic_size_t page_out_above; /* threshold for paging out: the limit, or slightly more than what cannot
+                                      be paged out if that is larger */
 static char place[4096];
 
 gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
@@ -43,7 +43,7 @@ gbt_status paged_start(const char *folder, size_t limit, gbt_error *err)
     pthread_mutex_lock(&lock);
     snprintf(place, sizeof place, "%s", folder);
     pthread_mutex_unlock(&lock);
-    atomic_store(&let_go_above, limit);
+    atomic_store(&page_out_above, limit);
     atomic_store(&resident_limit, limit > 0 ? limit : 1);
     return GBT_OK;
 }
@@ -145,14 +145,14 @@ bool paged_unmap(void *pointer)
 void paged_check(void)
 {
     const size_t limit = atomic_load_explicit(&resident_limit, memory_order_relaxed);
-    if (limit == 0 || mem_resident_bytes() <= atomic_load_explicit(&let_go_above, memory_order_relaxed))
+    if (limit == 0 || mem_resident_bytes() <= atomic_load_explicit(&page_out_above, memory_order_relaxed))
         return;
     pthread_mutex_lock(&lock);
     for (size_t i = 0; i < atomic_load(&mapping_count); i++)
         madvise(mappings[i].start, mappings[i].bytes, MADV_DONTNEED); /* a shared file mapping: values are
                                                                          kept in the file */
     const size_t stays = mem_resident_bytes() + limit / 16;
-    atomic_store(&let_go_above, stays > limit ? stays : limit);
+    atomic_store(&page_out_above, stays > limit ? stays : limit);
     pthread_mutex_unlock(&lock);
 }
 

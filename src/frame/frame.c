@@ -109,7 +109,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
         .pixel = (float)f->view.pixel,
         .parallel = f->view.kind == FOOTPRINT_PARALLEL,
         .pixel_min = f->pixel_limited ? f->draw.anchor_pixel : NULL};
-    GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->draw.chance,
+    GBT_TRY(visible_find(subject, &bounds, &extent, f->by_screen ? &f->screen : NULL, &f->draw.dropout,
                          &f->visible, &f->visible_count, &f->visible_capacity, err));
     f->times.visible = stage_lap(&clock);
     /* A Gaussian with opacity below alpha_min is never blended and has no gradient, so it is not made. */

@@ -46,7 +46,7 @@ typedef struct frame_drawing {
     bool one_start; /* with a rolling shutter, let all rays start at one point and move the Gaussians instead
                        (frame/one_start.h), so that lists per tile can replace the tree. An approximation for
                        training; it needs a footprint */
-    visible_chance chance;     /* anchors to leave out of the view at random, for training */
+    visible_dropout dropout;   /* anchors to leave out of the view at random, for training */
     bool makes_faint;          /* also make Gaussians with opacity below alpha_min, which are not drawn */
     const float *anchor_pixel; /* optional (NULL), [anchors]: the smallest pixel with which training saw each
                                   anchor; borrowed */

@@ -363,7 +363,7 @@ typedef struct visible_job {
     const view_bounds *bounds;
     const visible_reach *reach;
     const screen_view *screen;
-    const visible_chance *chance;
+    const visible_dropout *dropout;
     uint32_t *out;       /* [count]; block b writes from its own first element on */
     uint32_t *out_count; /* per block */
 } visible_job;
@@ -390,9 +390,10 @@ static bool may_be_met(const visible_job *job, size_t i)
     return is_visible(job->bounds, part.center, reach_of(&part, job->reach, pixel_min, job->bounds->center));
 }
 
-static bool is_left_out(const visible_chance *chance, size_t i)
+static bool is_left_out(const visible_dropout *dropout, size_t i)
 {
-    return chance != NULL && chance->share > 0 && rng_uniform(chance->seed, chance->draw, i) < chance->share;
+    return dropout != NULL && dropout->share > 0 &&
+           rng_uniform(dropout->seed, dropout->draw, i) < dropout->share;
 }
 
 static void visible_block(size_t block, size_t begin, size_t end, void *context)
@@ -400,20 +401,20 @@ static void visible_block(size_t block, size_t begin, size_t end, void *context)
     const visible_job *job = context;
     uint32_t kept = 0;
     for (size_t i = begin; i < end; i++)
-        if (may_be_met(job, i) && !is_left_out(job->chance, i))
+        if (may_be_met(job, i) && !is_left_out(job->dropout, i))
             job->out[begin + kept++] = (uint32_t)i;
     job->out_count[block] = kept;
 }
 
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        const screen_view *screen, const visible_chance *chance, uint32_t **visible,
+                        const screen_view *screen, const visible_dropout *dropout, uint32_t **visible,
                         size_t *count, size_t *capacity, gbt_error *err)
 {
     const size_t parts = frame_subject_count(subject), blocks = parallel_block_count(parts, PART_BLOCK);
     GBT_TRY(mem_reserve((void **)visible, capacity, 0, parts + blocks + 1, sizeof **visible, "visible parts",
                         err));
     uint32_t *list = *visible;
-    visible_job job = {subject, bounds, reach, screen, chance, list, list + parts};
+    visible_job job = {subject, bounds, reach, screen, dropout, list, list + parts};
     parallel_blocks(parts, PART_BLOCK, visible_block, &job);
     *count = 0;
     for (size_t b = 0; b < blocks; b++) {

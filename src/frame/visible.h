@@ -52,10 +52,10 @@ typedef struct visible_reach {
 } visible_reach;
 
 /** Anchors are left out at random, each with probability `share`, as a function of (seed, draw, anchor). */
-typedef struct visible_chance {
+typedef struct visible_dropout {
     float share; /* [0, 1); 0: none */
     uint64_t seed, draw;
-} visible_chance;
+} visible_dropout;
 
 /**
  * Write the indices of the anchors whose Gaussians a ray may hit, or of such plain Gaussians, ascending, into
@@ -63,10 +63,10 @@ typedef struct visible_chance {
  *
  * @param screen [in] optional (NULL): then anchors are visible iff their own ellipsoid touches it, regardless
  *                    of the bounds
- * @param chance [in] optional (NULL)
+ * @param dropout [in] optional (NULL)
  */
 gbt_status visible_find(frame_subject subject, const view_bounds *bounds, const visible_reach *reach,
-                        const screen_view *screen, const visible_chance *chance, uint32_t **visible,
+                        const screen_view *screen, const visible_dropout *dropout, uint32_t **visible,
                         size_t *count, size_t *capacity, gbt_error *err);
 
 #endif

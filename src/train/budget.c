@@ -13,7 +13,8 @@ static double hits_of_rays(const train_rules *rules, double progress)
 void budget_follow(step_speed *s, const trainer *t, uint64_t step, const step_report *r)
 {
     const frame_times *f = &r->times;
-    const double of_pixels = (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->beside;
+    const double of_pixels =
+        (f->rays.wall + f->trace.wall + f->adjoint.wall + r->compare.wall) / r->views_at_once;
     const double fixed = fmax(0, r->all.wall - of_pixels);
     const double hits = hits_of_rays(&t->rules, pace_progress(&t->pace, step));
     /* The mean covers so many steps that the few slow ones weigh in it as they do in the whole part. */

@@ -17,7 +17,7 @@ enum { ADAM_BLOCK = 256 };
 
 typedef struct rate_rule {
     double first, last; /* the reference's rates, log-linear from first to last over the run */
-    double own;         /* factor of our rate over the reference's */
+    double own_factor;  /* factor of our rate over the reference's */
     bool times_extent;  /* the reference's is proportional to the extent of the cameras */
     bool ages_with_run; /* Adam's bias is corrected by the age of the run, not of the anchor */
     bool is_log_scale;  /* clamped between scale_log_min and the anchor's scale_log_max */
@@ -28,14 +28,14 @@ typedef struct rate_rule {
    overshoot, so they use the anchor's age. Features are copied from other anchors and have far to go, so they
    use the age of the run. */
 static const rate_rule anchor_rules[ANCHOR_FIELDS] = {
-    [ANCHOR_FEATURE] = {.first = 0.0075, .last = 0.0075, .own = 1.5, .ages_with_run = true},
-    [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own = 4.5, .times_extent = true},
-    [ANCHOR_SCALE_LOG] = {.first = 0.007, .last = 0.007, .own = 3, .is_log_scale = true},
+    [ANCHOR_FEATURE] = {.first = 0.0075, .last = 0.0075, .own_factor = 1.5, .ages_with_run = true},
+    [ANCHOR_OFFSET] = {.first = 0.01, .last = 0.0001, .own_factor = 4.5, .times_extent = true},
+    [ANCHOR_SCALE_LOG] = {.first = 0.007, .last = 0.007, .own_factor = 3, .is_log_scale = true},
 };
 static const rate_rule network_rules[DECODER_NETWORKS] = {
-    [DECODER_OPACITY] = {.first = 0.002, .last = 0.00002, .own = 2},
-    [DECODER_SHAPE] = {.first = 0.004, .last = 0.004, .own = 2},
-    [DECODER_COLOR] = {.first = 0.008, .last = 0.00005, .own = 2},
+    [DECODER_OPACITY] = {.first = 0.002, .last = 0.00002, .own_factor = 2},
+    [DECODER_SHAPE] = {.first = 0.004, .last = 0.004, .own_factor = 2},
+    [DECODER_COLOR] = {.first = 0.008, .last = 0.00005, .own_factor = 2},
 };
 
 /* ---- rates ---- */
@@ -49,10 +49,10 @@ static double decay(double first, double last, double progress)
 
 static double rate_at(const rate_rule *r, const learning_rates_def *def, double factor)
 {
-    const double scale = def->own          ? r->own
-                         : r->times_extent ? def->extent
-                                           : 1,
-                 last = def->own && r->first == r->last ? def->end * r->first : r->last;
+    const double scale = def->uses_own_rates ? r->own_factor
+                         : r->times_extent   ? def->extent
+                                             : 1,
+                 last = def->uses_own_rates && r->first == r->last ? def->end * r->first : r->last;
     return factor * decay(r->first, last, def->progress) * scale;
 }
 
@@ -60,7 +60,7 @@ learning_rates learning_rates_at(const learning_rates_def *def)
 {
     learning_rates rates = {.views = def->views};
     double factor = def->factor;
-    if (def->own && def->progress > SCHEDULE_COOL_FROM)
+    if (def->uses_own_rates && def->progress > SCHEDULE_COOL_FROM)
         factor *= cool_end + (1 - cool_end) * fmax(1 - def->progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
         rates.anchor[f] = rate_at(&anchor_rules[f], def, factor);

@@ -34,7 +34,7 @@ typedef struct learning_rates {
 /** What the rates of a step depend on. */
 typedef struct learning_rates_def {
     double progress;      /* train_rules_progress() */
-    bool own;             /* our higher rates, for runs of some thousand steps; false: the reference's */
+    bool uses_own_rates;  /* our higher rates, for runs of some thousand steps; false: the reference's */
     double geometry_from; /* the rates of offsets and scales are 0 before this progress */
     double extent;        /* camera extent; the reference's rate of offsets is proportional to it */
     double factor;        /* multiplies all rates */

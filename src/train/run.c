@@ -118,10 +118,10 @@ typedef struct run_clock {
     step_speed measured;
     double begin, offset, paused, last_save; /* seconds; offset: training time before the run was resumed */
     int next_eval;
-    save_beside *saving;
+    save_in_background *saving;
 } run_clock;
 
-static run_clock clock_start(const trainer *t, const run_log *log, save_beside *saving)
+static run_clock clock_start(const trainer *t, const run_log *log, save_in_background *saving)
 {
     run_clock c = {.begin = clock_wall(), .offset = t->seconds, .last_save = t->seconds, .saving = saving};
     const double *at = t->def.eval_at_seconds,
@@ -156,8 +156,8 @@ static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *er
 static bool is_of_data(gbt_status status) { return status == GBT_ERR_FORMAT || status == GBT_ERR_IO; }
 
 /* End a failed run; it is saved first if the data caused the failure. */
-static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *saving, gbt_status status,
-                             const gbt_error *why, gbt_error *err)
+static gbt_status end_failed(trainer *t, const run_paths *paths, save_in_background *saving,
+                             gbt_status status, const gbt_error *why, gbt_error *err)
 {
     if (is_of_data(status) && t->step > 0 && cluster_leads()) {
         save_finish(saving, NULL);
@@ -168,7 +168,7 @@ static gbt_status end_failed(trainer *t, const run_paths *paths, save_beside *sa
 }
 
 /* Wait for a background save. False when it failed; then the present state must be saved. */
-static bool end_saving(save_beside *saving)
+static bool end_saving(save_in_background *saving)
 {
     gbt_error why = {0};
     const bool fine = save_finish(saving, &why) == GBT_OK;
@@ -217,7 +217,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
     return GBT_OK;
 }
 
-static gbt_status run_steps(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
+static gbt_status run_steps(trainer *t, const run_paths *paths, save_in_background *saving, run_log *log,
                             gbt_error *err)
 {
     run_clock c = clock_start(t, log, saving);
@@ -304,7 +304,7 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 
 /* Save everything before the held-out photos are aligned, because alignment takes time and can be
    interrupted. */
-static gbt_status finish(trainer *t, const run_paths *paths, save_beside *saving, run_log *log,
+static gbt_status finish(trainer *t, const run_paths *paths, save_in_background *saving, run_log *log,
                          gbt_error *err)
 {
     end_saving(saving);
@@ -348,7 +348,7 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     GBT_TRY(check_same_start(t, err));
     run_log log = {0};
     gbt_status status = GBT_OK;
-    save_beside *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
+    save_in_background *saving = mem_calloc(1, sizeof *saving, "checkpoint", err);
     GBT_TRY(cluster_agree(saving != NULL ? GBT_OK : GBT_ERR_NO_MEMORY, err));
     if (cluster_leads()) {
         status = begin_files(t, run, paths, def, strings, err);

@@ -191,27 +191,27 @@ static bool copy_trainer(const trainer *t, trainer *copy, void **memory)
 
 static void write_copy(void *context)
 {
-    save_beside *s = context;
+    save_in_background *s = context;
     s->error = (gbt_error){0};
     s->status = save_all(&s->copy, s->paths, &s->error);
 }
 
-gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err)
+gbt_status save_begin(save_in_background *s, trainer *t, const run_paths *paths, gbt_error *err)
 {
     if (!copy_trainer(t, &s->copy, &s->memory))
         return save_surely(t, paths, err);
     s->paths = paths;
-    beside_start(&s->job, write_copy, s);
+    background_start(&s->job, write_copy, s);
     return GBT_OK;
 }
 
-bool save_is_under_way(save_beside *s) { return s->memory != NULL && !beside_is_over(&s->job); }
+bool save_is_under_way(save_in_background *s) { return s->memory != NULL && !background_is_over(&s->job); }
 
-gbt_status save_finish(save_beside *s, gbt_error *err)
+gbt_status save_finish(save_in_background *s, gbt_error *err)
 {
     if (s->memory == NULL)
         return GBT_OK;
-    beside_wait(&s->job);
+    background_wait(&s->job);
     mem_free(s->memory);
     s->memory = NULL;
     return s->status == GBT_OK ? GBT_OK : base_fail(err, s->status, "%s", s->error.text);

@@ -3,7 +3,7 @@
 #ifndef GBT_TRAIN_SAVE_H
 #define GBT_TRAIN_SAVE_H
 
-#include "base/beside.h"
+#include "base/background.h"
 #include "train/trainer.h"
 
 enum { RUN_PATH_SIZE = 4096 };
@@ -19,25 +19,25 @@ typedef struct run_paths {
 gbt_status save_surely(trainer *t, const run_paths *paths, gbt_error *err);
 
 /** A background save: writes a copy of all changing state while steps go on. Start from {0}. */
-typedef struct save_beside {
-    beside job;
+typedef struct save_in_background {
+    background_job job;
     trainer copy;
     void *memory; /* memory of the copy; NULL: no save is in progress */
     const run_paths *paths;
     gbt_status status;
     gbt_error error;
-} save_beside;
+} save_in_background;
 
 /**
  * Begin a background save; `paths` are borrowed until save_finish(). Without memory for the copy, the save is
  * complete when this returns. No other save may be in progress: call save_finish() first.
  */
-gbt_status save_begin(save_beside *s, trainer *t, const run_paths *paths, gbt_error *err);
+gbt_status save_begin(save_in_background *s, trainer *t, const run_paths *paths, gbt_error *err);
 
 /** Still being written? */
-bool save_is_under_way(save_beside *s);
+bool save_is_under_way(save_in_background *s);
 
 /** Wait for the save and return its result; GBT_OK when none is in progress. */
-gbt_status save_finish(save_beside *s, gbt_error *err);
+gbt_status save_finish(save_in_background *s, gbt_error *err);
 
 #endif

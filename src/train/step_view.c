@@ -91,7 +91,7 @@ void step_photos_pick(trainer *t)
 static gbt_status pick(trainer *t, step_view *v, uint64_t before, gbt_error *err)
 {
     const size_t view = t->train_views[v->slot];
-    v->frame.draw.chance = (visible_chance){
+    v->frame.draw.dropout = (visible_dropout){
         .share = t->left_out, .seed = t->def.seed, .draw = (uint64_t)RNG_STREAM_LEFT_OUT << 48 | before};
     photo_sample sample = {.pick = pick_pixels(t, view, before)};
     v->frame.draw.pixel_step = sample.pick.step;
@@ -157,7 +157,7 @@ gbt_status step_view_draw(const trainer *t, step_view *v, size_t view, const gbt
     v->frame.draw.pixel_step = 1;
     v->frame.draw.renderer = t->def.renderer;
     v->frame.draw.one_start = false;
-    v->frame.draw.chance.share = 0;
+    v->frame.draw.dropout.share = 0;
     return frame_render(&v->frame, frame_neural(&t->anchors, &t->decoder), camera, &settings, adjoint, err);
 }
 

@@ -107,7 +107,7 @@ static gbt_status run_views(trainer *t, step_report *out, gbt_error *err)
         stage_add(&out->compare, v->compare_time);
         views += v->seconds;
     }
-    out->beside = fmax(1, views / wall);
+    out->views_at_once = fmax(1, views / wall);
     clock = clock_wall();
     step_exchange_outcomes(t);
     out->wait_seconds = clock_wall() - clock;
@@ -197,7 +197,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                leaves_out = t->rules.leaves_out && train_rules_are_loose(&t->rules, progress);
     const learning_rates rates = learning_rates_at(
         &(learning_rates_def){.progress = train_rules_progress(&t->rules, &t->pace, t->step),
-                              .own = t->rules.own_rates,
+                              .uses_own_rates = t->rules.own_rates,
                               .geometry_from = t->rules.geometry_from,
                               .extent = t->extent,
                               .factor = t->def.learning_rate_factor * sqrt(views),

@@ -25,7 +25,7 @@ typedef struct step_report {
     size_t gaussians, visible;    /* means over its views */
     uint64_t rays, hits, blended; /* of all views */
     frame_times times;            /* sums over its views; so are photo and compare */
-    double beside;                /* mean number of views that ran at the same time */
+    double views_at_once;         /* mean number of views that ran at the same time */
     stage_time photo, compare, optimizer, adjust, all;
     double wait_seconds, exchange_seconds; /* wait: until all processes had finished their views; exchange:
                                               for sending rows */

@@ -346,8 +346,8 @@ static void left_out_at_random(void **state)
     uint32_t *visible = NULL, seen[MANY] = {0};
     size_t count, capacity = 0, in_all = 0;
     for (uint64_t draw = 0; draw < DRAWS; draw++) {
-        const visible_chance chance = {.share = 0.25f, .seed = 7, .draw = draw};
-        assert_ok(visible_find(frame_neural(&a, NULL), &all, &reach, NULL, &chance, &visible, &count,
+        const visible_dropout dropout = {.share = 0.25f, .seed = 7, .draw = draw};
+        assert_ok(visible_find(frame_neural(&a, NULL), &all, &reach, NULL, &dropout, &visible, &count,
                                &capacity, NULL));
         assert_in_range(count, MANY * 0.72, MANY * 0.78);
         for (size_t i = 0; i < count; i++)
@@ -356,7 +356,7 @@ static void left_out_at_random(void **state)
     for (size_t i = 0; i < MANY; i++)
         in_all += seen[i] == DRAWS;
     assert_in_range(in_all, MANY * 0.39, MANY * 0.46); /* 0.75^3 = 0.42 */
-    const visible_chance none = {.share = 0, .seed = 7};
+    const visible_dropout none = {.share = 0, .seed = 7};
     assert_ok(
         visible_find(frame_neural(&a, NULL), &all, &reach, NULL, &none, &visible, &count, &capacity, NULL));
     assert_int_equal(count, MANY);

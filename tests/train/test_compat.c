@@ -118,7 +118,7 @@ static void rates_count_from_one(void **state)
         t.step = wanted[i].step - 1;
         const learning_rates r = learning_rates_at(
             &(learning_rates_def){.progress = train_rules_progress(&t.rules, &t.pace, t.step),
-                                  .own = t.rules.own_rates,
+                                  .uses_own_rates = t.rules.own_rates,
                                   .geometry_from = t.rules.geometry_from,
                                   .extent = 2,
                                   .factor = 1,

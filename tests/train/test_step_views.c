@@ -142,7 +142,7 @@ static void rates_follow_the_views(void **state)
     const double progress = pace_progress(&t.pace, t.step), step = 1.0 / (V * LENGTH);
     const learning_rates rates =
         learning_rates_at(&(learning_rates_def){.progress = progress,
-                                                .own = true,
+                                                .uses_own_rates = true,
                                                 .geometry_from = t.rules.geometry_from,
                                                 .extent = t.extent,
                                                 .factor = 2,

@@ -164,7 +164,7 @@ static void resumes_from_a_save_beside_the_steps(void **state)
 static void a_save_has_its_own_exposures_and_poses(void **state)
 {
     (void)state;
-    static save_beside save;
+    static save_in_background save;
     static run_paths paths;
     trainer t;
     step_report r;
@@ -440,7 +440,7 @@ static void a_budget_gives_its_parts_equal_times(void **state)
         for (uint64_t i = 0; i < t.pace.steps[part]; i++, t.step++) {
             const double progress = pace_progress(&t.pace, t.step), times = t.step % 50 == 49 ? 20 : 1,
                          of_pixels = times * 0.09 * (progress < SCHEDULE_EXACT_FROM ? 1 : 2);
-            const step_report report = {.beside = 1,
+            const step_report report = {.views_at_once = 1,
                                         .times.trace.wall = of_pixels,
                                         .photo.wall = times * 0.008,
                                         .all.wall = times * 0.01 + of_pixels};
@@ -520,7 +520,7 @@ static void training_learns(void **state)
         last_loss += i >= 152 ? r.loss / 8 : 0;
     }
     assert_ok(held_out_psnr(&t, &after, NULL));
-    t.views[0].frame.draw.chance.share = 0.5f; /* as steps of long runs leave it */
+    t.views[0].frame.draw.dropout.share = 0.5f; /* as steps of long runs leave it */
     assert_ok(held_out_psnr(&t, &again, NULL));
     assert_true(again == after);
     print_message("held out: %.2f -> %.2f dB, loss %.4f -> %.4f, anchors %zu -> %zu\n", before, after,
@@ -675,7 +675,7 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     memcpy(before.feature, t.anchors.feature, n * ANCHOR_FEATURE_DIM * sizeof(float));
     const learning_rates rates =
         learning_rates_at(&(learning_rates_def){.progress = pace_progress(&t.pace, t.step),
-                                                .own = true,
+                                                .uses_own_rates = true,
                                                 .geometry_from = t.rules.geometry_from,
                                                 .extent = t.extent,
                                                 .factor = t.def.learning_rate_factor,
@@ -1390,7 +1390,7 @@ static void pace_is_read(void **state)
 static learning_rates rates_at(double progress, bool own, double geometry_from, double extent, double end)
 {
     return learning_rates_at(&(learning_rates_def){.progress = progress,
-                                                   .own = own,
+                                                   .uses_own_rates = own,
                                                    .geometry_from = geometry_from,
                                                    .extent = extent,
                                                    .factor = 1,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* base/beside.c -- run one job on a background thread. */
-#include "base/beside.h"
+/* base/background.c -- run one job on a background thread. */
+#include "base/background.h"
 
 #include <signal.h>
 #include <stddef.h>
@@ -10,13 +10,13 @@
 static void *run_job(void *context)
 {
     PLAIN_NUMBERS; /* a new thread has the program's locale */
-    beside *b = context;
+    background_job *b = context;
     b->run(b->context);
     atomic_store(&b->over, true);
     return NULL;
 }
 
-void beside_start(beside *b, void (*run)(void *context), void *context)
+void background_start(background_job *b, void (*run)(void *context), void *context)
 {
     sigset_t all, before;
     b->run = run;
@@ -30,9 +30,9 @@ void beside_start(beside *b, void (*run)(void *context), void *context)
         run_job(b);
 }
 
-bool beside_is_over(beside *b) { return atomic_load(&b->over); }
+bool background_is_over(background_job *b) { return atomic_load(&b->over); }
 
-void beside_wait(beside *b)
+void background_wait(background_job *b)
 {
     if (b->started)
         pthread_join(b->thread, NULL);

@@ -8,7 +8,7 @@
 /** Was the anchor in view often enough for its importance to be reliable? */
 static inline bool growth_is_judged(const growth_def *def, float visit_count)
 {
-    return visit_count > def->interval * GROWTH_SUCCESS;
+    return visit_count > def->interval * GROWTH_VIEW_SHARE;
 }
 
 /**

@@ -57,7 +57,7 @@ float growth_level_threshold(const growth_def *def, int level);
 /** Was the Gaussian seen in enough views for its mean gradient to be reliable? */
 static inline bool growth_well_sampled(const growth_def *def, float grad_count)
 {
-    return grad_count > def->interval * GROWTH_SUCCESS * 0.5f;
+    return grad_count > def->interval * GROWTH_VIEW_SHARE * 0.5f;
 }
 
 /** Start a level with an empty grid; false when the level has no grid or is not to be searched. */

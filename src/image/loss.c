@@ -46,7 +46,7 @@ enum {
 };
 
 /* Row buffers of the tile that a thread works on. */
-typedef struct loss_room {
+typedef struct loss_buffers {
     atomic_flag taken;
     double moments[LOSS_MOMENTS][RING][ROW_STRIDE], partials[LOSS_PARTIALS][RING][ROW_STRIDE];
     double wide[LOSS_GROUP * LOSS_PARTIALS][WIDE_STRIDE];
@@ -54,7 +54,7 @@ typedef struct loss_room {
     double inside[ROW_STRIDE], nothing[ROW_STRIDE], counted[LOSS_GROUP][ROW_STRIDE];
     float x[LOSS_GROUP][ROW_STRIDE], y[LOSS_GROUP][ROW_STRIDE], d_x[LOSS_GROUP][ROW_STRIDE];
     float pixels_x[ROW_MAX + 2 * LOSS_STEP], pixels_y[ROW_MAX + 2 * LOSS_STEP];
-} loss_room;
+} loss_buffers;
 
 typedef struct loss_job {
     const loss_kernels *kernels;
@@ -64,13 +64,13 @@ typedef struct loss_job {
     double l1_scale, ssim_scale;
     size_t width, height, across, tile_count, band_rows;
     double *sums; /* [SUMS][tile_count] */
-    loss_room *rooms;
-    size_t room_count;
+    loss_buffers *buffer_sets;
+    size_t set_count;
 } loss_job;
 
 typedef struct loss_tile {
     const loss_job *job;
-    loss_room *room;
+    loss_buffers *buffers;
     ptrdiff_t first;      /* column of its first pixel; may be left of the image */
     size_t segment;       /* pixels per lane */
     size_t count;         /* values in a row */
@@ -80,9 +80,9 @@ typedef struct loss_tile {
 
 static size_t round_up(size_t count, size_t multiple) { return (count + multiple - 1) / multiple * multiple; }
 
-static loss_tile tile_at(const loss_job *job, loss_room *room, size_t index)
+static loss_tile tile_at(const loss_job *job, loss_buffers *buffers, size_t index)
 {
-    loss_tile t = {.job = job, .room = room};
+    loss_tile t = {.job = job, .buffers = buffers};
     const size_t place = index % job->across; /* tiles of one row have nearly equal widths */
     t.column = place * job->width / job->across;
     t.owned = (place + 1) * job->width / job->across - t.column;
@@ -134,33 +134,33 @@ static void fetch_pixels(const loss_tile *t, const float *picture, ptrdiff_t row
 /* Compute one row of the moments and store it in their ring buffer. */
 static void moment_row(const loss_tile *t, ptrdiff_t row, size_t place)
 {
-    loss_room *room = t->room;
+    loss_buffers *buffers = t->buffers;
     if (!is_row(t, row)) {
         for (int m = 0; m < LOSS_MOMENTS; m++)
-            memset(room->moments[m][place], 0, t->count * sizeof(double));
+            memset(buffers->moments[m][place], 0, t->count * sizeof(double));
         return;
     }
     const loss_kernels *kernels = t->job->kernels;
     const size_t pixels = t->count / CHANNELS + 2 * RADIUS;
     fetch_pixels(t, t->job->x, row + LOSS_GROUP);
     fetch_pixels(t, t->job->y, row + LOSS_GROUP);
-    copy_pixels(t->job, t->job->x, (size_t)row, t->first - RADIUS, pixels, room->pixels_x);
-    copy_pixels(t->job, t->job->y, (size_t)row, t->first - RADIUS, pixels, room->pixels_y);
-    kernels->to_lanes(room->pixels_x + LOSS_EDGE, t->count, room->x[0]);
-    kernels->to_lanes(room->pixels_y + LOSS_EDGE, t->count, room->y[0]);
+    copy_pixels(t->job, t->job->x, (size_t)row, t->first - RADIUS, pixels, buffers->pixels_x);
+    copy_pixels(t->job, t->job->y, (size_t)row, t->first - RADIUS, pixels, buffers->pixels_y);
+    kernels->to_lanes(buffers->pixels_x + LOSS_EDGE, t->count, buffers->x[0]);
+    kernels->to_lanes(buffers->pixels_y + LOSS_EDGE, t->count, buffers->y[0]);
     double edges[LOSS_MOMENTS][2][LOSS_EDGE], *products[LOSS_MOMENTS];
     for (int side = 0; side < 2; side++) {
         const size_t from = side == 0 ? 0 : LOSS_EDGE + t->count;
         double *const out[LOSS_MOMENTS] = {edges[0][side], edges[1][side], edges[2][side], edges[3][side]};
-        kernels->products(room->pixels_x + from, room->pixels_y + from, LOSS_EDGE, out);
+        kernels->products(buffers->pixels_x + from, buffers->pixels_y + from, LOSS_EDGE, out);
     }
     for (int m = 0; m < LOSS_MOMENTS; m++)
-        products[m] = room->wide[m] + LOSS_MARGIN;
-    kernels->products(room->x[0], room->y[0], t->count, products);
+        products[m] = buffers->wide[m] + LOSS_MARGIN;
+    kernels->products(buffers->x[0], buffers->y[0], t->count, products);
     for (int m = 0; m < LOSS_MOMENTS; m++)
         kernels->margins(products[m], t->count, edges[m][0], edges[m][1]);
     for (int m = 0; m < LOSS_MOMENTS; m++)
-        kernels->row_pass(products[m], t->count, room->moments[m][place]);
+        kernels->row_pass(products[m], t->count, buffers->moments[m][place]);
 }
 
 /* Mask of the pixels of a row at which the SSIM map counts. */
@@ -168,10 +168,10 @@ static const double *counts_of(const loss_tile *t, ptrdiff_t row, double *out)
 {
     const loss_job *job = t->job;
     if (!is_row(t, row))
-        return t->room->nothing;
+        return t->buffers->nothing;
     if (job->valid == NULL)
-        return t->room->inside;
-    memcpy(out, t->room->inside, t->count * sizeof *out);
+        return t->buffers->inside;
+    memcpy(out, t->buffers->inside, t->count * sizeof *out);
     const unsigned char *valid = job->valid + (size_t)row * job->width;
     for (size_t i = 0; i < LOSS_LANES * t->segment; i++) {
         const ptrdiff_t column = t->first + (ptrdiff_t)i;
@@ -185,59 +185,61 @@ static const double *counts_of(const loss_tile *t, ptrdiff_t row, double *out)
 /* Compute a group of rows of the partials and store them in the ring buffer. */
 static void map_rows(const loss_tile *t, ptrdiff_t first_row, size_t first_place)
 {
-    loss_room *room = t->room;
+    loss_buffers *buffers = t->buffers;
     const double *moments[LOSS_MOMENTS][LOSS_SPAN], *counts[LOSS_GROUP], none[LOSS_EDGE] = {0};
     double weight[LOSS_GROUP], *partials[LOSS_GROUP][LOSS_PARTIALS];
     for (size_t m = 0; m < LOSS_MOMENTS; m++)
         for (size_t k = 0; k < LOSS_SPAN; k++)
-            moments[m][k] = room->moments[m][(first_place + k) % RING];
+            moments[m][k] = buffers->moments[m][(first_place + k) % RING];
     for (size_t k = 0; k < LOSS_GROUP; k++) {
         const ptrdiff_t row = first_row + (ptrdiff_t)k;
-        counts[k] = counts_of(t, row, room->counted[k]);
+        counts[k] = counts_of(t, row, buffers->counted[k]);
         weight[k] = row >= (ptrdiff_t)t->begin && row < (ptrdiff_t)t->end;
         for (size_t m = 0; m < LOSS_PARTIALS; m++)
-            partials[k][m] = room->wide[k * LOSS_PARTIALS + m] + LOSS_MARGIN;
+            partials[k][m] = buffers->wide[k * LOSS_PARTIALS + m] + LOSS_MARGIN;
     }
     t->job->kernels->map((const double *const(*)[LOSS_SPAN])moments, counts, weight, t->count,
-                         (double *const(*)[LOSS_PARTIALS])partials, room->sums[0]);
+                         (double *const(*)[LOSS_PARTIALS])partials, buffers->sums[0]);
     for (size_t k = 0; k < LOSS_GROUP; k++)
         for (size_t m = 0; m < LOSS_PARTIALS; m++)
             t->job->kernels->margins(partials[k][m], t->count, none, none);
     for (size_t k = 0; k < LOSS_GROUP; k++)
         for (size_t m = 0; m < LOSS_PARTIALS; m++)
-            t->job->kernels->row_pass(partials[k][m], t->count, room->partials[m][(first_place + k) % RING]);
+            t->job->kernels->row_pass(partials[k][m], t->count,
+                                      buffers->partials[m][(first_place + k) % RING]);
 }
 
 /* Compute a group of rows of the gradient and store them in d_x. */
 static void gradient_rows(const loss_tile *t, size_t first_row, size_t first_place)
 {
     const loss_job *job = t->job;
-    loss_room *room = t->room;
+    loss_buffers *buffers = t->buffers;
     const double *partials[LOSS_PARTIALS][LOSS_SPAN];
     const float *x[LOSS_GROUP], *y[LOSS_GROUP];
     float *d_x[LOSS_GROUP];
     double weight[LOSS_GROUP];
     for (size_t m = 0; m < LOSS_PARTIALS; m++)
         for (size_t k = 0; k < LOSS_SPAN; k++)
-            partials[m][k] = room->partials[m][(first_place + k) % RING];
+            partials[m][k] = buffers->partials[m][(first_place + k) % RING];
     for (size_t k = 0; k < LOSS_GROUP; k++) {
-        x[k] = room->x[k];
-        y[k] = room->y[k];
-        d_x[k] = room->d_x[k];
+        x[k] = buffers->x[k];
+        y[k] = buffers->y[k];
+        d_x[k] = buffers->d_x[k];
         weight[k] = first_row + k < t->end;
         if (first_row + k >= t->end)
             continue;
-        copy_pixels(job, job->x, first_row + k, t->first, t->count / CHANNELS, room->pixels_x);
-        copy_pixels(job, job->y, first_row + k, t->first, t->count / CHANNELS, room->pixels_y);
-        job->kernels->to_lanes(room->pixels_x, t->count, room->x[k]);
-        job->kernels->to_lanes(room->pixels_y, t->count, room->y[k]);
+        copy_pixels(job, job->x, first_row + k, t->first, t->count / CHANNELS, buffers->pixels_x);
+        copy_pixels(job, job->y, first_row + k, t->first, t->count / CHANNELS, buffers->pixels_y);
+        job->kernels->to_lanes(buffers->pixels_x, t->count, buffers->x[k]);
+        job->kernels->to_lanes(buffers->pixels_y, t->count, buffers->y[k]);
     }
     job->kernels->gradient((const double *const(*)[LOSS_SPAN])partials, x, y, weight, t->count, job->l1_scale,
-                           job->ssim_scale, d_x, room->sums[1], room->sums[2]);
+                           job->ssim_scale, d_x, buffers->sums[1], buffers->sums[2]);
     for (size_t k = 0; k < LOSS_GROUP && first_row + k < t->end; k++) {
         const size_t at = (first_row + k) * job->width + t->column;
-        job->kernels->from_lanes(room->d_x[k], t->count, room->pixels_x);
-        memcpy(job->d_x + at * CHANNELS, room->pixels_x + LOSS_EDGE, t->owned * CHANNELS * sizeof *job->d_x);
+        job->kernels->from_lanes(buffers->d_x[k], t->count, buffers->pixels_x);
+        memcpy(job->d_x + at * CHANNELS, buffers->pixels_x + LOSS_EDGE,
+               t->owned * CHANNELS * sizeof *job->d_x);
         for (size_t i = at; job->valid != NULL && i < at + t->owned; i++)
             if (!job->valid[i])
                 memset(job->d_x + i * CHANNELS, 0, CHANNELS * sizeof *job->d_x);
@@ -254,17 +256,17 @@ static void keep_pixels(const loss_tile *t, size_t begin, size_t end, double *ro
     }
 }
 
-static void run_tile(const loss_job *job, loss_room *room, size_t index)
+static void run_tile(const loss_job *job, loss_buffers *buffers, size_t index)
 {
-    const loss_tile t = tile_at(job, room, index);
+    const loss_tile t = tile_at(job, buffers, index);
     for (size_t i = 0; i < t.count; i++)
-        room->inside[i] = 1;
+        buffers->inside[i] = 1;
     const size_t left = t.first < 0 ? (size_t)-t.first : 0;
-    keep_pixels(&t, left, (size_t)((ptrdiff_t)job->width - t.first), room->inside);
-    memset(room->nothing, 0, sizeof room->nothing);
-    memset(room->sums, 0, sizeof room->sums);
-    memset(room->x, 0, sizeof room->x);
-    memset(room->y, 0, sizeof room->y);
+    keep_pixels(&t, left, (size_t)((ptrdiff_t)job->width - t.first), buffers->inside);
+    memset(buffers->nothing, 0, sizeof buffers->nothing);
+    memset(buffers->sums, 0, sizeof buffers->sums);
+    memset(buffers->x, 0, sizeof buffers->x);
+    memset(buffers->y, 0, sizeof buffers->y);
 
     /* Rows are processed in groups from top to bottom. Moments start 2 RADIUS rows above the first row of the
        gradient, partials RADIUS rows above it. */
@@ -280,16 +282,16 @@ static void run_tile(const loss_job *job, loss_room *room, size_t index)
             gradient_rows(&t, t.begin + place - 2 * AHEAD * LOSS_GROUP, place - 2 * AHEAD * LOSS_GROUP);
     }
     for (size_t i = 0; i < SUMS; i++) {
-        keep_pixels(&t, RADIUS, RADIUS + t.owned, room->sums[i]);
-        job->sums[i * job->tile_count + index] = window_sum(room->sums[i], t.count);
+        keep_pixels(&t, RADIUS, RADIUS + t.owned, buffers->sums[i]);
+        job->sums[i * job->tile_count + index] = window_sum(buffers->sums[i], t.count);
     }
 }
 
 /* Take a free buffer; there are as many as threads. */
-static size_t take_room(const loss_job *job)
+static size_t take_buffers(const loss_job *job)
 {
-    for (size_t i = 0;; i = (i + 1) % job->room_count)
-        if (!atomic_flag_test_and_set(&job->rooms[i].taken))
+    for (size_t i = 0;; i = (i + 1) % job->set_count)
+        if (!atomic_flag_test_and_set(&job->buffer_sets[i].taken))
             return i;
 }
 
@@ -298,9 +300,9 @@ static void run_one_tile(size_t tile, size_t begin, size_t end, void *context)
     (void)begin;
     (void)end;
     const loss_job *job = context;
-    const size_t room = take_room(job);
-    run_tile(job, &job->rooms[room], tile);
-    atomic_flag_clear(&job->rooms[room].taken);
+    const size_t set = take_buffers(job);
+    run_tile(job, &job->buffer_sets[set], tile);
+    atomic_flag_clear(&job->buffer_sets[set].taken);
 }
 
 /* Number of rows of tiles: more for a small image, which would otherwise be a single tile. */
@@ -365,14 +367,15 @@ gbt_status image_loss(const image *x, const image *y, const unsigned char *valid
     const size_t bands = band_count(job.height, job.across);
     job.tile_count = job.across * bands;
     job.band_rows = round_up(parallel_block_count(job.height, bands), LOSS_GROUP);
-    job.room_count = smaller_size((size_t)parallel_threads(), job.tile_count);
-    const size_t room_doubles = job.room_count * sizeof(loss_room) / sizeof(double);
+    job.set_count = smaller_size((size_t)parallel_threads(), job.tile_count);
+    const size_t buffer_doubles = job.set_count * sizeof(loss_buffers) / sizeof(double);
     GBT_TRY(mem_reserve((void **)&scratch->buffer, &scratch->capacity, 0,
-                        room_doubles + SUMS * job.tile_count, sizeof *scratch->buffer, "loss scratch", err));
-    job.rooms = (loss_room *)scratch->buffer;
-    job.sums = scratch->buffer + room_doubles;
-    for (size_t i = 0; i < job.room_count; i++)
-        atomic_flag_clear(&job.rooms[i].taken);
+                        buffer_doubles + SUMS * job.tile_count, sizeof *scratch->buffer, "loss scratch",
+                        err));
+    job.buffer_sets = (loss_buffers *)scratch->buffer;
+    job.sums = scratch->buffer + buffer_doubles;
+    for (size_t i = 0; i < job.set_count; i++)
+        atomic_flag_clear(&job.buffer_sets[i].taken);
 
     const size_t all = job.width * job.height, pixels = valid != NULL ? count_valid(valid, all) : all;
     if (pixels == 0) {

@@ -180,7 +180,7 @@ typedef float vec8 __attribute__((vector_size(32)));
 
 /* Transpose 8 x 8 values by exchanging blocks of 1, 2 and 4 values; only the last step crosses 128-bit
    halves, which is expensive. */
-BODY void turn8(const float *in, size_t in_row, float *out, size_t out_row)
+BODY void transpose8(const float *in, size_t in_row, float *out, size_t out_row)
 {
     vec8 x[8], y[8];
 #pragma GCC unroll 8
@@ -214,7 +214,7 @@ BODY void to_lanes_body(const float *pixels, size_t count, float *lanes)
     const size_t segment = count / LOSS_LANES;
     for (size_t k = 0; k < segment; k += 8) {
         const size_t at = k + 8 <= segment ? k : segment - 8;
-        turn8(pixels + at, segment, lanes + at * LOSS_LANES, LOSS_LANES);
+        transpose8(pixels + at, segment, lanes + at * LOSS_LANES, LOSS_LANES);
     }
 }
 
@@ -223,7 +223,7 @@ BODY void from_lanes_body(const float *lanes, size_t count, float *pixels)
     const size_t segment = count / LOSS_LANES;
     for (size_t k = 0; k < segment; k += 8) {
         const size_t at = k + 8 <= segment ? k : segment - 8;
-        turn8(lanes + at * LOSS_LANES, LOSS_LANES, pixels + at, segment);
+        transpose8(lanes + at * LOSS_LANES, LOSS_LANES, pixels + at, segment);
     }
 }
 

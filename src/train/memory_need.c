@@ -30,7 +30,7 @@ memory_need memory_need_of(const scene *s, double downscale, const train_rules *
         train_count += !v->is_test;
         train_bytes += v->is_test ? 0 : (3 + (v->mask_path != NULL) + v->has_alpha) * pixels;
     }
-    const bool seeds = s->points.count < SEED_FEW_PLACES || !seen_points_tell(s);
+    const bool seeds = s->points.count < SEED_FEW_PLACES || !seen_points_match_cameras(s);
     const double seeding = !seeds ? 0
                                   : fmin(train_count, SEED_VIEWS_MOST) * SEED_PIXEL_BYTES *
                                         fmin(largest, (double)SEED_LONG_SIDE * SEED_LONG_SIDE);

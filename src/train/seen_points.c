@@ -18,7 +18,7 @@ static bool sees_a_point(const gbt_camera *camera, const scene_points *points)
     return false;
 }
 
-bool seen_points_tell(const scene *s)
+bool seen_points_match_cameras(const scene *s)
 {
     size_t count = 0, seeing = 0, blind = 0;
     for (size_t v = 0; v < s->view_count; v++)

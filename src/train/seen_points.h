@@ -10,6 +10,6 @@
 /** Whether at least half of the training photos see a sparse point. Otherwise the points are useless: they
     may be in another coordinate system, with a few in view by chance. Cost: at most 2^14 projections for each
     photo. */
-bool seen_points_tell(const scene *s);
+bool seen_points_match_cameras(const scene *s);
 
 #endif

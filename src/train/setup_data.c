@@ -56,7 +56,7 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
 {
     scene_points *points = &t->scene.points, made = {0};
     size_t places = 0;
-    const bool blind = !seen_points_tell(&t->scene);
+    const bool blind = !seen_points_match_cameras(&t->scene);
     if (!blind)
         GBT_TRY(count_places(points, SEED_FEW_PLACES, &places, err));
     const bool few = places < SEED_FEW_PLACES && t->rules.adds_to_few_points;

@@ -112,7 +112,7 @@ gbt_status colmap_add_sighting(raw_scene *raw, const colmap_image_id *images, ui
     const colmap_image_id *found =
         raw->view_count > 0 ? bsearch(&key, images, raw->view_count, sizeof key, by_image_id) : NULL;
     if (found != NULL)
-        return raw_add_sighting(raw, found->view, position, err);
+        return raw_add_sighting_of_next(raw, found->view, position, err);
     raw->tracks_missing++;
     return GBT_OK;
 }

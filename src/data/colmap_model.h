@@ -48,7 +48,7 @@ typedef struct colmap_image_id {
 gbt_status colmap_images_sorted(const raw_scene *raw, const char *file, colmap_image_id **images,
                                 gbt_error *err);
 
-/** raw_add_sighting() for an entry of a track: the view is looked up by image id in the result of
+/** raw_add_sighting_of_next() for an entry of a track: the view is looked up by image id in the result of
     colmap_images_sorted(). */
 gbt_status colmap_add_sighting(raw_scene *raw, const colmap_image_id *images, uint32_t id,
                                const double position[3], gbt_error *err);

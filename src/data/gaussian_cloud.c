@@ -107,7 +107,7 @@ void gaussian_middle(const float *mean, size_t count, const double low[3], const
     }
 }
 
-float gaussian_cloud_near(double said) { return said > 0 && said < 1e30 ? (float)said : 0; }
+float gaussian_cloud_near(double stored) { return stored > 0 && stored < 1e30 ? (float)stored : 0; }
 
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name)
 {

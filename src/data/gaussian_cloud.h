@@ -73,7 +73,7 @@ void gaussian_middle(const float *mean, size_t count, const double low[3], const
                      double middle[3]);
 
 /** The near distance as a file states it, or 0 when it is unusable. */
-float gaussian_cloud_near(double said);
+float gaussian_cloud_near(double stored);
 
 /** Log one warning when rows were dropped or corrected: how many, and how. `name` is the file's. */
 void gaussian_cloud_warn(const gaussian_cloud *cloud, const char *name);

@@ -148,7 +148,7 @@ static float near_of(const source_file *file, const ply_header *header)
 }
 
 /* Whether the header contains this text. */
-static bool says(const source_file *file, const ply_header *header, const char *line)
+static bool header_contains(const source_file *file, const ply_header *header, const char *line)
 {
     return memmem(file->bytes, header->data_at, line, strlen(line)) != NULL;
 }
@@ -163,8 +163,8 @@ gbt_status gaussian_ply_read(const source_file *file, gaussian_cloud *out, gbt_e
         return base_fail(err, GBT_ERR_FORMAT, "%s: no element vertex in the header", file->name);
     gbt_status status = compressed_ply_is(&header) ? compressed_ply_read(file, &header, out, err)
                                                    : read_plain(file, &header, vertex, out, err);
-    out->antialiased =
-        says(file, &header, "\n" GAUSSIAN_PLY_MIP) || says(file, &header, "\ncomment antialiased 1");
+    out->antialiased = header_contains(file, &header, "\n" GAUSSIAN_PLY_MIP) ||
+                       header_contains(file, &header, "\ncomment antialiased 1");
     out->near = near_of(file, &header);
     if (status == GBT_OK && out->count == 0)
         status = base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu rows dropped)", file->name,
@@ -212,8 +212,8 @@ static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_erro
                          (unsigned long long)(out->file.size - header->data_at));
     out->count = (size_t)rows;
     out->sh_degree = degree_of(out->rest_count);
-    out->antialiased =
-        says(&head, header, "\n" GAUSSIAN_PLY_MIP) || says(&head, header, "\ncomment antialiased 1");
+    out->antialiased = header_contains(&head, header, "\n" GAUSSIAN_PLY_MIP) ||
+                       header_contains(&head, header, "\ncomment antialiased 1");
     out->near = near_of(&head, header);
     return GBT_OK;
 }

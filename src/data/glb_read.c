@@ -76,7 +76,7 @@ static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
 }
 
 /* Whether the node has this array of numbers, with values other than `wanted`. */
-static bool is_not(const json_t *node, const char *key, const double *wanted, size_t count)
+static bool differs(const json_t *node, const char *key, const double *wanted, size_t count)
 {
     const json_t *numbers = json_object_get(node, key);
     for (size_t k = 0; numbers != NULL && k < count; k++)
@@ -86,12 +86,12 @@ static bool is_not(const json_t *node, const char *key, const double *wanted, si
 }
 
 /* Whether the node has a transformation other than a translation. */
-static bool is_placed(const json_t *node)
+static bool is_rotated_or_scaled(const json_t *node)
 {
     static const double matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
                         rotation[4] = {0, 0, 0, 1}, scale[3] = {1, 1, 1};
-    return is_not(node, "matrix", matrix, 16) || is_not(node, "rotation", rotation, 4) ||
-           is_not(node, "scale", scale, 3);
+    return differs(node, "matrix", matrix, 16) || differs(node, "rotation", rotation, 4) ||
+           differs(node, "scale", scale, 3);
 }
 
 static bool has_mesh(const json_t *node, size_t mesh_index)
@@ -100,8 +100,8 @@ static bool has_mesh(const json_t *node, size_t mesh_index)
     return json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
 }
 
-/* Mark the nodes of the mesh, and all their ancestors, in `matters`. `parent` starts as [count] zeros. */
-static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, bool *matters)
+/* Mark the nodes of the mesh, and all their ancestors, in `holds_mesh`. `parent` starts as [count] zeros. */
+static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, bool *holds_mesh)
 {
     const size_t count = json_array_size(nodes);
     const json_t *node, *child;
@@ -117,14 +117,14 @@ static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, b
     }
     json_array_foreach(nodes, i, node)
     {
-        for (k = has_mesh(node, mesh_index) ? i + 1 : 0; k != 0 && !matters[k - 1]; k = parent[k - 1])
-            matters[k - 1] = true;
+        for (k = has_mesh(node, mesh_index) ? i + 1 : 0; k != 0 && !holds_mesh[k - 1]; k = parent[k - 1])
+            holds_mesh[k - 1] = true;
     }
 }
 
 /* The translation of the mesh's node becomes the cloud's origin. Any other transformation of that node or its
    ancestors is an error; other nodes (cameras, lights and so on) are ignored. */
-static gbt_status place_of(const reading *r, const json_t *nodes, const bool *matters, size_t mesh_index,
+static gbt_status place_of(const reading *r, const json_t *nodes, const bool *holds_mesh, size_t mesh_index,
                            double place[3], gbt_error *err)
 {
     static const double nowhere[3] = {0, 0, 0};
@@ -134,7 +134,8 @@ static gbt_status place_of(const reading *r, const json_t *nodes, const bool *ma
     {
         const json_t *translation = json_object_get(node, "translation");
         const bool own = has_mesh(node, mesh_index);
-        if (matters[i] && (is_placed(node) || (!own && is_not(node, "translation", nowhere, 3))))
+        if (holds_mesh[i] &&
+            (is_rotated_or_scaled(node) || (!own && differs(node, "translation", nowhere, 3))))
             return wrong(r, "nodes with a matrix, rotation or scale, or one in another, are not read", err);
         for (size_t k = 0; own && k < 3; k++)
             place[k] = json_number_value(json_array_get(translation, k));
@@ -149,14 +150,14 @@ static gbt_status read_place(const reading *r, size_t mesh_index, double place[3
     const json_t *nodes = json_object_get(r->root, "nodes");
     const size_t count = json_array_size(nodes);
     size_t *parent = mem_calloc(count, sizeof *parent, "nodes", err);
-    bool *matters = mem_calloc(count, sizeof *matters, "nodes", err);
-    gbt_status status = parent != NULL && matters != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
+    bool *holds_mesh = mem_calloc(count, sizeof *holds_mesh, "nodes", err);
+    gbt_status status = parent != NULL && holds_mesh != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     if (status == GBT_OK) {
-        find_nodes(nodes, mesh_index, parent, matters);
-        status = place_of(r, nodes, matters, mesh_index, place, err);
+        find_nodes(nodes, mesh_index, parent, holds_mesh);
+        status = place_of(r, nodes, holds_mesh, mesh_index, place, err);
     }
     mem_free(parent);
-    mem_free(matters);
+    mem_free(holds_mesh);
     return status;
 }
 

@@ -66,7 +66,8 @@ static void cut_ranges(const float *sorted, const double (*sums)[2], size_t coun
     qsort(levels, PALETTE_LEVELS, sizeof *levels, compare_floats);
 }
 
-gbt_status palette_levels(const float *values, size_t count, float levels[PALETTE_LEVELS], gbt_error *err)
+gbt_status palette_scalar_levels(const float *values, size_t count, float levels[PALETTE_LEVELS],
+                                 gbt_error *err)
 {
     float *sorted = mem_alloc(count, sizeof *sorted, "levels", err);
     double(*sums)[2] = mem_calloc(count + 1, sizeof *sums, "levels", err);
@@ -103,15 +104,15 @@ typedef struct cell {
     float mean[WIDTH_MAX];
 } cell;
 
-typedef struct cutting {
+typedef struct cell_splitter {
     const float *vectors;
     size_t width;
     uint32_t *order, *spare;
     cell *heap; /* a max-heap by error */
     size_t count;
-} cutting;
+} cell_splitter;
 
-static void measure(const cutting *c, cell *out)
+static void measure(const cell_splitter *c, cell *out)
 {
     double mean[WIDTH_MAX] = {0}, error = 0;
     for (size_t i = out->begin; i < out->end; i++)
@@ -127,7 +128,7 @@ static void measure(const cutting *c, cell *out)
     out->error = out->end - out->begin > 1 ? error : 0;
 }
 
-static double along(const cutting *c, const cell *from, uint32_t row, const double *axis)
+static double along(const cell_splitter *c, const cell *from, uint32_t row, const double *axis)
 {
     double sum = 0;
     for (size_t k = 0; k < c->width; k++)
@@ -137,7 +138,7 @@ static double along(const cutting *c, const cell *from, uint32_t row, const doub
 
 /* The principal axis of a cell by power iteration, started with the difference of the farthest vector to the
    mean. */
-static void principal_axis(const cutting *c, const cell *from, double axis[WIDTH_MAX])
+static void principal_axis(const cell_splitter *c, const cell *from, double axis[WIDTH_MAX])
 {
     double farthest = -1;
     for (size_t i = from->begin; i < from->end; i++) {
@@ -169,7 +170,7 @@ static void principal_axis(const cutting *c, const cell *from, double axis[WIDTH
 
 /* Partition a cell by the side of the mean on which its vectors lie along the principal axis: those below
    first, each half in its old order. Returns where the second half begins. */
-static size_t divide(const cutting *c, const cell *from)
+static size_t split_cell(const cell_splitter *c, const cell *from)
 {
     double axis[WIDTH_MAX];
     principal_axis(c, from, axis);
@@ -189,8 +190,8 @@ static bool goes_before(const cell *a, const cell *b)
     return a->error > b->error || (!(a->error < b->error) && a->begin < b->begin);
 }
 
-/* The first cell of the heap, to where it belongs. */
-static void sink_down(cutting *c)
+/* Sinks the first cell of the heap to its place. */
+static void sink_down(cell_splitter *c)
 {
     for (size_t at = 0, child; (child = 2 * at + 1) < c->count; at = child) {
         if (child + 1 < c->count && goes_before(&c->heap[child + 1], &c->heap[child]))
@@ -203,7 +204,7 @@ static void sink_down(cutting *c)
     }
 }
 
-static void push(cutting *c, const cell *added)
+static void push(cell_splitter *c, const cell *added)
 {
     size_t at = c->count++;
     for (; at > 0 && goes_before(added, &c->heap[(at - 1) / 2]); at = (at - 1) / 2)
@@ -217,7 +218,7 @@ static int by_begin(const void *a, const void *b)
     return (x->begin > y->begin) - (x->begin < y->begin);
 }
 
-static void cut_cells(cutting *c, size_t count, size_t limit)
+static void split_cells(cell_splitter *c, size_t count, size_t limit)
 {
     cell all = {.end = count};
     for (size_t i = 0; i < count; i++)
@@ -226,7 +227,7 @@ static void cut_cells(cutting *c, size_t count, size_t limit)
     push(c, &all);
     while (c->count < limit && c->heap[0].error > 0) {
         cell low = c->heap[0], high = c->heap[0];
-        low.end = high.begin = divide(c, &c->heap[0]);
+        low.end = high.begin = split_cell(c, &c->heap[0]);
         if (low.end == low.begin || high.end == high.begin) { /* the vectors do not differ measurably */
             c->heap[0].error = 0;
             sink_down(c);
@@ -245,14 +246,14 @@ gbt_status palette_make(const float *vectors, size_t count, size_t width, size_t
                         gbt_error *err)
 {
     *out = (palette){.width = width};
-    cutting c = {.vectors = vectors, .width = width};
+    cell_splitter c = {.vectors = vectors, .width = width};
     c.order = mem_alloc(count, sizeof *c.order, "a palette", err);
     c.spare = mem_alloc(count, sizeof *c.spare, "a palette", err);
     c.heap = mem_alloc(limit, sizeof *c.heap, "a palette", err);
     out->labels = mem_alloc(count, sizeof *out->labels, "a palette", err);
     gbt_status status = GBT_ERR_NO_MEMORY;
     if (c.order != NULL && c.spare != NULL && c.heap != NULL && out->labels != NULL) {
-        cut_cells(&c, count, limit);
+        split_cells(&c, count, limit);
         out->count = c.count;
         out->entries = mem_alloc(c.count, width * sizeof *out->entries, "a palette", err);
         status = out->entries == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;

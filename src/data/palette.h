@@ -12,7 +12,8 @@ enum { PALETTE_LEVELS = 256 };
 
 /** 256 levels, ascending, with a small mean squared distance to the values; chosen by splitting as in
     palette_make(). There must be at least one value. */
-gbt_status palette_levels(const float *values, size_t count, float levels[PALETTE_LEVELS], gbt_error *err);
+gbt_status palette_scalar_levels(const float *values, size_t count, float levels[PALETTE_LEVELS],
+                                 gbt_error *err);
 
 /** The index of the nearest level. */
 unsigned char palette_nearest(const float levels[PALETTE_LEVELS], float value);

@@ -30,7 +30,8 @@ static double box_weight(const box *b, uint64_t pixel)
 }
 
 /* Resample one row from `in_count` to `out_count` pixels. */
-static void narrow_row(const float *in, size_t in_count, size_t channels, float *out, size_t out_count)
+static void resample_horizontally(const float *in, size_t in_count, size_t channels, float *out,
+                                  size_t out_count)
 {
     for (size_t i = 0; i < out_count; i++) {
         const box b = box_of(i, in_count, out_count);
@@ -46,8 +47,8 @@ static void narrow_row(const float *in, size_t in_count, size_t channels, float 
 }
 
 /* Row i of the output, as a weighted mean of input rows of `values` numbers; `sum` is scratch. */
-static void lower_row(const float *in, size_t in_count, size_t values, double *sum, float *out, size_t i,
-                      size_t out_count)
+static void resample_vertically(const float *in, size_t in_count, size_t values, double *sum, float *out,
+                                size_t i, size_t out_count)
 {
     const box b = box_of(i, in_count, out_count);
     memset(sum, 0, values * sizeof *sum);
@@ -75,10 +76,11 @@ gbt_status photo_resize(const image *in, int width, int height, image *out, gbt_
         status = image_alloc(out, width, height, in->channels, err);
     if (status == GBT_OK) {
         for (size_t y = 0; y < in_height; y++)
-            narrow_row(in->pixels + y * in_width * channels, in_width, channels, narrow.pixels + y * values,
-                       (size_t)width);
+            resample_horizontally(in->pixels + y * in_width * channels, in_width, channels,
+                                  narrow.pixels + y * values, (size_t)width);
         for (size_t y = 0; y < (size_t)height; y++)
-            lower_row(narrow.pixels, in_height, values, sum, out->pixels + y * values, y, (size_t)height);
+            resample_vertically(narrow.pixels, in_height, values, sum, out->pixels + y * values, y,
+                                (size_t)height);
     }
     image_free(&narrow);
     mem_free(sum);

@@ -104,7 +104,7 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
     raw->point_count++;
 }
 
-gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3], gbt_error *err)
+gbt_status raw_add_sighting_of_next(raw_scene *raw, size_t view, const double position[3], gbt_error *err)
 {
     raw_view *v = &raw->views[view];
     if (!is_usable(position) || raw->point_count > UINT32_MAX)

@@ -81,7 +81,7 @@ void raw_add_point(raw_scene *raw, const double position[3], const float color[3
 
 /** Record that raw->views[view] sees the point which is passed to raw_add_point() next. Does nothing if that
     point is going to be dropped. */
-gbt_status raw_add_sighting(raw_scene *raw, size_t view, const double position[3], gbt_error *err);
+gbt_status raw_add_sighting_of_next(raw_scene *raw, size_t view, const double position[3], gbt_error *err);
 
 /** How near the sparse points seen in a photo come to its camera: the first percentile of their depths,
     because a few points are wrong; for lenses that also look sideways and back, a fifth of a percentile of

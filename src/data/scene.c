@@ -38,7 +38,7 @@ static gbt_status load_file(const char *path, raw_scene *raw, source_file *out, 
 }
 
 /* COLMAP 4 also writes the poses of rigs. They are not needed: image poses already include them. */
-static void say_rigs(const char *model, const char *ending)
+static void log_rigs(const char *model, const char *ending)
 {
     char name[32], path[PATH_SIZE];
     snprintf(name, sizeof name, "rigs.%s", ending);
@@ -74,7 +74,7 @@ static gbt_status read_model(const char *model, const char *ending, raw_scene *r
     for (int i = 0; i < 3; i++)
         mem_free(owned[i]);
     if (status == GBT_OK)
-        say_rigs(model, ending);
+        log_rigs(model, ending);
     return status;
 }
 

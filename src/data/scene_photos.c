@@ -83,7 +83,7 @@ gbt_status scene_find_photos(const char *folder, raw_scene *raw, gbt_error *err)
 
 /* Data sets with cut-out photos normally have only such photos, so a few are enough to tell; reading hundreds
    of opaque ones would take long. */
-enum { LOOKED_AT_MAX = 4 };
+enum { PHOTOS_READ_MAX = 4 };
 
 void scene_set_alpha(scene *s, gbt_alpha alpha)
 {
@@ -93,7 +93,7 @@ void scene_set_alpha(scene *s, gbt_alpha alpha)
         s->views[i].alpha = alpha;
 }
 
-static bool is_cut_out(const char *path)
+static bool has_transparency(const char *path)
 {
     image photo;
     if (image_read(path, &photo, NULL) != GBT_OK)
@@ -105,20 +105,20 @@ static bool is_cut_out(const char *path)
 
 bool scene_background(const scene *s, float color[3])
 {
-    size_t looked_at = 0;
-    for (size_t i = 0, next = 0; i < s->view_count && looked_at < LOOKED_AT_MAX; i++) {
+    size_t photos_read = 0;
+    for (size_t i = 0, next = 0; i < s->view_count && photos_read < PHOTOS_READ_MAX; i++) {
         const scene_view *view = &s->views[i];
         image_header header;
         if (i < next || view->is_test || view->alpha == GBT_ALPHA_MASK ||
             image_header_read(view->path, &header, NULL) != GBT_OK || !header.has_alpha)
             continue;
-        if (is_cut_out(view->path)) {
+        if (has_transparency(view->path)) {
             for (int c = 0; c < 3; c++)
                 color[c] = view->alpha == GBT_ALPHA_WHITE;
             return true;
         }
-        looked_at++;
-        next = i + s->view_count / LOOKED_AT_MAX;
+        photos_read++;
+        next = i + s->view_count / PHOTOS_READ_MAX;
     }
     return false;
 }

@@ -139,7 +139,7 @@ static gbt_status put_levels(writing *w, const float *values, size_t stride, boo
         return GBT_ERR_NO_MEMORY;
     for (size_t i = 0; i < 3 * n; i++)
         all[i] = values[i / 3 * stride + i % 3];
-    gbt_status status = palette_levels(all, 3 * n, levels, w->err);
+    gbt_status status = palette_scalar_levels(all, 3 * n, levels, w->err);
     if (status == GBT_OK)
         status = open_pixels(w);
     for (size_t i = 0; i < n && status == GBT_OK; i++) {
@@ -161,7 +161,7 @@ static gbt_status put_levels(writing *w, const float *values, size_t stride, boo
 static gbt_status put_palette(writing *w, const palette *p, size_t functions)
 {
     float levels[PALETTE_LEVELS];
-    GBT_TRY(palette_levels(p->entries, p->count * p->width, levels, w->err));
+    GBT_TRY(palette_scalar_levels(p->entries, p->count * p->width, levels, w->err));
     GBT_TRY(open_table(&w->table, SOG_ENTRIES_PER_ROW * functions,
                        (p->count + SOG_ENTRIES_PER_ROW - 1) / SOG_ENTRIES_PER_ROW, w->err));
     for (size_t i = 0; i < p->count * p->width; i++)

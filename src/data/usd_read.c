@@ -131,8 +131,8 @@ typedef struct numbers {
 
 typedef struct prim {
     numbers fields[FIELDS];
-    double translate[3]; /* in double */
-    bool other_place;    /* there is a transformation that is ignored */
+    double translate[3];    /* in double */
+    bool ignored_transform; /* there is a transformation that is ignored */
 } prim;
 
 static field_id field_of(token name, bool *half)
@@ -193,7 +193,7 @@ static void skip_value(reading *r)
 }
 
 /* Whether the token names a transformation. */
-static bool is_place(token t)
+static bool is_transform(token t)
 {
     static const char place[] = "xformOp:";
     return t.length >= sizeof place && memcmp(t.at, place, sizeof place - 1) == 0;
@@ -208,8 +208,8 @@ static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
         skip_value(r);
         token value = {.at = r->at};
         reading again = {.file = r->file, .at = from, .end = r->at};
-        p->other_place |=
-            is_place(name) && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
+        p->ignored_transform |=
+            is_transform(name) && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
         return GBT_OK;
     }
     return take_numbers(r, p, f, err);
@@ -236,13 +236,13 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
 {
     token t;
     bool defined = false;
-    int placed = 0; /* depth of the outermost ancestor with a transformation; 0: none */
+    int transform_depth = 0; /* depth of the outermost ancestor with a transformation; 0: none */
     while (next(r, &t)) {
         if (is(t, "}"))
-            placed = *depth == placed ? 0 : placed;
+            transform_depth = *depth == transform_depth ? 0 : transform_depth;
         *depth += is(t, "{") ? 1 : is(t, "}") ? -1 : 0;
-        if (placed == 0 && is_place(t))
-            placed = *depth;
+        if (transform_depth == 0 && is_transform(t))
+            transform_depth = *depth;
         if (!(defined && is(t, prim_type))) {
             defined = is(t, "def");
             continue;
@@ -250,14 +250,14 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
         while (next(r, &t) && !is(t, "{"))
             if (is(t, "("))
                 skip_group(r);
-        p->other_place |= placed != 0;
+        p->ignored_transform |= transform_depth != 0;
         return GBT_OK;
     }
     return base_fail(err, GBT_ERR_FORMAT, "%s: has no prim of the type %s", r->file->name, prim_type);
 }
 
 /* Whether an ancestor of the prim just read has a transformation that comes later in the text. */
-static bool placed_behind(reading *r, int depth)
+static bool has_later_transform(reading *r, int depth)
 {
     token t;
     for (int inside = 0; depth > 0 && next(r, &t);) {
@@ -265,7 +265,7 @@ static bool placed_behind(reading *r, int depth)
             inside++;
         else if (is(t, "}"))
             *(inside > 0 ? &inside : &depth) -= 1;
-        else if (inside == 0 && is_place(t))
+        else if (inside == 0 && is_transform(t))
             return true;
     }
     return false;
@@ -318,7 +318,7 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     int depth = 0;
     GBT_TRY(find_prim(r, p, &depth, err));
     GBT_TRY(read_prim(r, p, err));
-    p->other_place |= placed_behind(r, depth);
+    p->ignored_transform |= has_later_transform(r, depth);
     GBT_TRY(check(r, p, &functions, err));
     const size_t count = p->fields[POSITIONS].count / 3;
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
@@ -329,7 +329,7 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);
-    if (p->other_place)
+    if (p->ignored_transform)
         log_warn(
             "%s: the prim's rotation and scale are left out, and all transformations of the prims that it is "
             "in; its own coordinates are read, and its translation",

@@ -132,7 +132,7 @@ static void nearest_in_a_photo(void **state)
         const bool far = i >= IN_FRONT;
         const double position[3] = {far ? 0 : 7, far ? 0 : -7,
                                     far ? out_of_view[i - IN_FRONT] : IN_FRONT + 1 - i};
-        assert_int_equal(raw_add_sighting(&raw, 0, position, NULL), GBT_OK);
+        assert_int_equal(raw_add_sighting_of_next(&raw, 0, position, NULL), GBT_OK);
         raw_add_point(&raw, position, grey);
     }
     assert_int_equal(raw.points_dropped, 3);
@@ -163,7 +163,7 @@ static void nearest_around_a_panorama(void **state)
     for (int i = 0; i < AROUND; i++) {
         const double z = (2 * i + 1.0) / AROUND - 1, side = 2 * sqrt(1 - z * z);
         const double position[3] = {side * cos(i), side * sin(i), 1 + 2 * z};
-        assert_int_equal(raw_add_sighting(&raw, 0, position, NULL), GBT_OK);
+        assert_int_equal(raw_add_sighting_of_next(&raw, 0, position, NULL), GBT_OK);
         raw_add_point(&raw, position, grey);
     }
     double nearest;

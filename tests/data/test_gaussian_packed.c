@@ -251,7 +251,7 @@ static void levels_follow_the_values(void **state)
         low = fminf(low, values[i]);
         high = fmaxf(high, values[i]);
     }
-    assert_ok(palette_levels(values, COUNT, levels, &assert_ok_err_));
+    assert_ok(palette_scalar_levels(values, COUNT, levels, &assert_ok_err_));
     const double step = ((double)high - (double)low) / 255;
     for (size_t i = 0; i < COUNT; i++) {
         const unsigned char k = palette_nearest(levels, values[i]);
@@ -265,7 +265,7 @@ static void levels_follow_the_values(void **state)
         fail_msg("%g of equal steps", error / equal);
     for (size_t i = 0; i < COUNT; i++)
         values[i] = (float)(i % 7);
-    assert_ok(palette_levels(values, COUNT, levels, &assert_ok_err_));
+    assert_ok(palette_scalar_levels(values, COUNT, levels, &assert_ok_err_));
     for (size_t i = 0; i < COUNT; i++)
         assert_true(fabsf(levels[palette_nearest(levels, values[i])] - values[i]) < 1e-6f);
 }

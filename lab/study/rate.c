@@ -95,7 +95,7 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
     if (status == GBT_OK)
         status = run_sensitivity(r, &s, err);
     if (status == GBT_OK)
-        status = model_turn_features(&r->model, &s, err);
+        status = model_transform_features(&r->model, &s, err);
     out->probe_seconds = clock_wall() - start;
     int left_out = 0;
     for (size_t i = 0; i < sizeof ladder / sizeof *ladder && status == GBT_OK; i++) {

@@ -14,11 +14,12 @@ gbt_status attribute_table_make(attribute_table *t, size_t rows, int columns, gb
     *t = (attribute_table){.rows = rows, .columns = columns};
     const size_t cells = (size_t)columns * sizeof *t->value;
     t->value = mem_calloc(rows, cells, "quantised attributes", err);
-    t->rest = mem_calloc(rows, cells, "quantised attributes", err);
+    t->abs_error = mem_calloc(rows, cells, "quantised attributes", err);
     t->doubling = mem_calloc(rows, sizeof *t->doubling, "quantised attributes", err);
     t->near = mem_calloc(rows, sizeof *t->near, "neighbours", err);
     t->rule = mem_calloc((size_t)columns, sizeof *t->rule, "prediction rules", err);
-    return t->value == NULL || t->rest == NULL || t->doubling == NULL || t->near == NULL || t->rule == NULL
+    return t->value == NULL || t->abs_error == NULL || t->doubling == NULL || t->near == NULL ||
+                   t->rule == NULL
                ? GBT_ERR_NO_MEMORY
                : GBT_OK;
 }
@@ -26,7 +27,7 @@ gbt_status attribute_table_make(attribute_table *t, size_t rows, int columns, gb
 void attribute_table_free(attribute_table *t)
 {
     mem_free(t->value);
-    mem_free(t->rest);
+    mem_free(t->abs_error);
     mem_free(t->doubling);
     mem_free(t->near);
     mem_free(t->rule);
@@ -129,7 +130,7 @@ static size_t bucket_near(const attribute_table *t, size_t row, size_t column)
     const size_t columns = (size_t)t->columns;
     uint64_t sum = 0;
     for (size_t k = 0; row > 0 && k < ATTRIBUTE_NEAR; k++)
-        sum += t->rest[t->near[row][k] * columns + column];
+        sum += t->abs_error[t->near[row][k] * columns + column];
     return bucket(sum >> t->doubling[row]);
 }
 
@@ -158,7 +159,7 @@ gbt_status attribute_code_columns(range_coder *c, attribute_table *t, int begin,
             const int64_t value = ((int64_t)base + left) * (1 << d);
             good = value >= -ATTRIBUTE_MAX && value <= ATTRIBUTE_MAX;
             t->value[at] = good ? (int32_t)value : 0;
-            t->rest[at] = (uint32_t)(left < 0 ? -left : left) << d;
+            t->abs_error[at] = (uint32_t)(left < 0 ? -left : left) << d;
             recent[column % RECENT] = (uint32_t)(left < 0 ? -left : left);
         }
     }

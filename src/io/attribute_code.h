@@ -35,9 +35,9 @@ typedef struct attribute_rule {
 typedef struct attribute_table {
     size_t rows;
     int columns;
-    int32_t *value;    /* [rows][columns], in steps of the column; a multiple of 2^doubling of the row */
-    uint32_t *rest;    /* [rows][columns], scratch: |prediction error|, in steps of the column */
-    uint8_t *doubling; /* [rows] */
+    int32_t *value;      /* [rows][columns], in steps of the column; a multiple of 2^doubling of the row */
+    uint32_t *abs_error; /* [rows][columns], scratch: |prediction error|, in steps of the column */
+    uint8_t *doubling;   /* [rows] */
     uint32_t (*near)[ATTRIBUTE_NEAR]; /* [rows]: indices of earlier rows, nearest first; unused in row 0 */
     attribute_rule *rule;             /* [columns] */
 } attribute_table;

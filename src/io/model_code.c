@@ -15,9 +15,9 @@ enum { SHAPE_FORM, SHAPE_COUNT, SHAPE_OFFSETS, SHAPE_PIXELS, SHAPE_LEVELS, SHAPE
 enum { FORM_COARSE = 1, FORM_LOSSLESS = 2 };
 /* Indices into coded.steps: the corner of the cube, the side of a cell, then the step of each column. */
 enum { STEPS_ORIGIN, STEPS_CELL = 3, STEPS_COLUMNS };
-/* A file that claims more anchors than ANCHORS_ANYWAY + ANCHORS_PER_BYTE x its bytes is rejected before
-   anything is allocated. A real anchor takes several bytes, not half a bit. */
-enum { ANCHORS_ANYWAY = 65536, ANCHORS_PER_BYTE = 16 };
+/* A file that claims more anchors than ANCHORS_ALWAYS_ALLOWED + ANCHORS_PER_BYTE x its bytes is rejected
+   before anything is allocated. A real anchor takes several bytes, not half a bit. */
+enum { ANCHORS_ALWAYS_ALLOWED = 65536, ANCHORS_PER_BYTE = 16 };
 
 _Static_assert(SHAPE_NUMBERS == sizeof((model_coded){0}.shape) / sizeof(uint32_t),
                "the shape has its places");
@@ -176,8 +176,8 @@ static gbt_status check_shape(const char *path, const uint32_t shape[SHAPE_NUMBE
                          "1 to %d, 0 or 1, 0 to %d)",
                          path, shape[SHAPE_OFFSETS], shape[SHAPE_PIXELS], shape[SHAPE_LEVELS],
                          ANCHOR_MAX_OFFSETS, POSITION_LEVELS_MAX);
-    if (shape[SHAPE_COUNT] > ANCHORS_ANYWAY &&
-        (shape[SHAPE_COUNT] - ANCHORS_ANYWAY) / ANCHORS_PER_BYTE > bytes)
+    if (shape[SHAPE_COUNT] > ANCHORS_ALWAYS_ALLOWED &&
+        (shape[SHAPE_COUNT] - ANCHORS_ALWAYS_ALLOWED) / ANCHORS_PER_BYTE > bytes)
         return base_fail(err, GBT_ERR_FORMAT, "%s: section coded.shape: %u anchors cannot be in %zu bytes",
                          path, shape[SHAPE_COUNT], bytes);
     return GBT_OK;

@@ -11,10 +11,10 @@
 
 enum { DIM = ANCHOR_FEATURE_DIM, GUESS_VIEWS = 16, DOUBLINGS_MAX = 2 };
 
-/* The guess without views counts every Gaussian as visible. Only about 1 / HIDDEN of the area that Gaussians
-   could cover is in front and in a picture, as measured against real views on three scenes
+/* The guess without views counts every Gaussian as visible. Only about 1 / VISIBLE_INVERSE of the area that
+   Gaussians could cover is in front and in a picture, as measured against real views on three scenes
    (docs/compression.md). */
-#define HIDDEN 30.0
+#define VISIBLE_INVERSE 30.0
 
 /* ---- sums ---- */
 
@@ -161,7 +161,7 @@ static gbt_status guess_view(const model *m, guess *g, uint64_t view, model_sens
         covered += guess_gradient(&g->drawn, i, view, &g->gradient);
     anchors_zero_learned(&g->d_anchors);
     GBT_TRY(decode_backward(a, &m->decoder, &g->tape, &g->gradient, &g->d_anchors, g->d_params, err));
-    model_sensitivity_add(s, a, &g->d_anchors, 3 * HIDDEN * covered);
+    model_sensitivity_add(s, a, &g->d_anchors, 3 * VISIBLE_INVERSE * covered);
     return GBT_OK;
 }
 

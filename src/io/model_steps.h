@@ -80,7 +80,7 @@ void model_sensitivity_free(model_sensitivity *s);
  * effect in every direction) and T C T^T is diagonal with descending elements (C: covariance of the
  * features).
  */
-gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err);
+gbt_status model_transform_features(model *m, model_sensitivity *s, gbt_error *err);
 
 /** Quantization steps; each > 0 and finite. */
 typedef struct model_steps {

@@ -80,7 +80,7 @@ enum { SIDES = 8, SET_MAX = 4, TREE_NODES = 256 };
 
 typedef struct tree_models {
     coder_bit_model by_level[POSITION_LEVELS_MAX][SET_MAX][SIDES];
-    coder_bit_model by_set[TREE_NODES][4];
+    coder_bit_model by_path[TREE_NODES][4];
     coder_bit_model by_sides[SIDES][8][SET_MAX];
     coder_mixer mixer[POSITION_LEVELS_MAX][8];
     coder_int_model extra; /* points in a cell after the first */
@@ -133,7 +133,7 @@ static unsigned code_children(range_coder *c, tree_models *m, int level, unsigne
             touching |= (sides >> (2 * k + (o >> k & 1)) & 1) << k;
         const unsigned near_count = set < SET_MAX ? set : SET_MAX - 1;
         coder_bit_model *const models[CODER_INPUTS] = {
-            &m->by_level[level][near_count][__builtin_popcount(touching)], &m->by_set[path][side_count / 2],
+            &m->by_level[level][near_count][__builtin_popcount(touching)], &m->by_path[path][side_count / 2],
             &m->by_sides[touching][o][near_count]};
         int bit = children >> o & 1;
         if (o == 7 && set == 0)
@@ -191,7 +191,7 @@ static gbt_status code_counts(range_coder *c, tree_models *m, const node_list *c
 static void start_models(tree_models *m)
 {
     coder_bits_start(&m->by_level[0][0][0], sizeof m->by_level / sizeof(coder_bit_model));
-    coder_bits_start(&m->by_set[0][0], sizeof m->by_set / sizeof(coder_bit_model));
+    coder_bits_start(&m->by_path[0][0], sizeof m->by_path / sizeof(coder_bit_model));
     coder_bits_start(&m->by_sides[0][0][0], sizeof m->by_sides / sizeof(coder_bit_model));
     coder_mixers_start(&m->mixer[0][0], sizeof m->mixer / sizeof(coder_mixer));
     coder_ints_start(&m->extra, 1);

@@ -427,7 +427,7 @@ static void decode_from(const model *m, gaussians *out)
     decode_tape_free(&tape);
 }
 
-static void turned_features_decode_the_same(void **state)
+static void transformed_features_decode_the_same(void **state)
 {
     (void)state;
     model m;
@@ -439,7 +439,7 @@ static void turned_features_decode_the_same(void **state)
     assert_ok(model_sensitivity_guess(&m, &s, NULL));
     assert_null(s.anchor);
     decode_from(&m, &before);
-    assert_ok(model_turn_features(&m, &s, NULL));
+    assert_ok(model_transform_features(&m, &s, NULL));
     decode_from(&m, &after);
     assert_int_equal(before.count, after.count);
     for (size_t i = 0; i < before.count; i++) {
@@ -548,7 +548,7 @@ int main(void)
         cmocka_unit_test(damage),
         cmocka_unit_test(forged_shapes),
         cmocka_unit_test(no_memory),
-        cmocka_unit_test(turned_features_decode_the_same),
+        cmocka_unit_test(transformed_features_decode_the_same),
         cmocka_unit_test(steps_follow_quality),
         cmocka_unit_test(steps_of_anchors),
     };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* io/model_turn.c -- transforms the features of a model to the basis that codes best, and its networks
+/* io/model_transform.c -- transforms the features of a model to the basis that codes best, and its networks
    accordingly. */
 #include <string.h>
 
@@ -45,9 +45,9 @@ static void find_covariance(const anchors *a, double mean[DIM], square covarianc
                                     ((double)a->feature[i * DIM + d] - mean[d]) / n;
 }
 
-/* T and its inverse: forth = U^T L^T, back = L^-T U, where L L^T = S / mean of S's diagonal, and U holds the
-   eigenvectors of L^T C L. */
-static void find_basis(const square sensitivity, const square covariance, square forth, square back)
+/* T and its inverse: transform = U^T L^T, inverse = L^-T U, where L L^T = S / mean of S's diagonal, and U
+   holds the eigenvectors of L^T C L. */
+static void find_basis(const square sensitivity, const square covariance, square transform, square inverse)
 {
     square scaled, l, product, u;
     double mean = 0;
@@ -73,22 +73,22 @@ static void find_basis(const square sensitivity, const square covariance, square
     eigenvectors(product, u);
     for (size_t i = 0; i < DIM; i++)
         for (size_t j = 0; j < DIM; j++) {
-            forth[i][j] = 0;
+            transform[i][j] = 0;
             for (size_t k = 0; k < DIM; k++)
-                forth[i][j] += u[k][i] * l[j][k];
+                transform[i][j] += u[k][i] * l[j][k];
         }
     for (size_t j = 0; j < DIM; j++) /* solve L^T x = u_j by back substitution */
         for (size_t i = DIM; i-- > 0;) {
             double sum = u[i][j];
             for (size_t k = i + 1; k < DIM; k++)
-                sum -= l[k][i] * back[k][j];
-            back[i][j] = sum / l[i][i];
+                sum -= l[k][i] * inverse[k][j];
+            inverse[i][j] = sum / l[i][i];
         }
 }
 
 /* Replace W1 by W1 T^-1, and add W1 (mean f) to the bias b1, because the mean is subtracted from the
    features. */
-static void turn_networks(decoder *d, const double mean[DIM], const square back)
+static void transform_networks(decoder *d, const double mean[DIM], const square inverse)
 {
     decoder_network networks[DECODER_NETWORKS];
     decoder_networks(d, networks);
@@ -97,28 +97,28 @@ static void turn_networks(decoder *d, const double mean[DIM], const square back)
         for (size_t h = 0; h < ANCHOR_HIDDEN_DIM; h++) {
             float *w = d->params + networks[i].begin + h * inputs,
                   *bias = d->params + networks[i].begin + ANCHOR_HIDDEN_DIM * inputs + h;
-            double turned[DIM] = {0}, sum = (double)*bias;
+            double transformed[DIM] = {0}, sum = (double)*bias;
             for (size_t c = 0; c < DIM; c++) {
                 sum += (double)w[c] * mean[c];
                 for (size_t e = 0; e < DIM; e++)
-                    turned[e] += (double)w[c] * back[c][e];
+                    transformed[e] += (double)w[c] * inverse[c][e];
             }
             for (size_t e = 0; e < DIM; e++)
-                w[e] = (float)turned[e];
+                w[e] = (float)transformed[e];
             *bias = (float)sum;
         }
 }
 
-gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err)
+gbt_status model_transform_features(model *m, model_sensitivity *s, gbt_error *err)
 {
     struct {
-        square covariance, forth, back;
+        square covariance, transform, inverse;
         double mean[DIM];
     } *t = mem_alloc(1, sizeof *t, "basis of features", err);
     if (t == NULL)
         return GBT_ERR_NO_MEMORY;
     find_covariance(&m->anchors, t->mean, t->covariance);
-    find_basis(s->feature, t->covariance, t->forth, t->back);
+    find_basis(s->feature, t->covariance, t->transform, t->inverse);
     double all = 0;
     for (size_t c = 0; c < DIM; c++)
         all += s->feature[c][c] / DIM;
@@ -127,14 +127,14 @@ gbt_status model_turn_features(model *m, model_sensitivity *s, gbt_error *err)
             s->feature[c][d] = c == d ? all : 0;
     for (size_t i = 0; i < m->anchors.count; i++) {
         float *f = m->anchors.feature + i * DIM;
-        double turned[DIM] = {0};
+        double transformed[DIM] = {0};
         for (size_t c = 0; c < DIM; c++)
             for (size_t d = 0; d < DIM; d++)
-                turned[c] += t->forth[c][d] * ((double)f[d] - t->mean[d]);
+                transformed[c] += t->transform[c][d] * ((double)f[d] - t->mean[d]);
         for (size_t c = 0; c < DIM; c++)
-            f[c] = (float)turned[c];
+            f[c] = (float)transformed[c];
     }
-    turn_networks(&m->decoder, t->mean, t->back);
+    transform_networks(&m->decoder, t->mean, t->inverse);
     mem_free(t);
     return GBT_OK;
 }

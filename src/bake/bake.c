@@ -31,17 +31,17 @@ typedef struct sums {
     double normal[PAIRS];   /* w y_k y_l, l <= k */
     double color[TERMS][3]; /* w y_k (c - 0.5) */
     float mean[3];
-    uint32_t kept; /* number of views in which the decoder made it (opacity above 0) */
+    uint32_t decoded_views; /* number of views in which the decoder made it (opacity above 0) */
 } sums;
 
 typedef struct baking {
     const anchors *a;
     int functions;
-    sums *sums;        /* [anchor] number of views in which the anchor was decoded */
-    uint32_t *visible; /* [anchor] views in which it was decoded */
+    sums *sums;             /* [anchor][k]: of Gaussian k */
+    uint32_t *anchor_views; /* [anchor] views in which it was decoded */
 } baking;
 
-bake_def bake_def_default(void) { return (bake_def){.sh_degree = 3, .prior = 0.3}; }
+bake_def bake_def_default(void) { return (bake_def){.sh_degree = 3, .prior_weight = 0.3}; }
 
 static void add_color(const baking *b, sums *s, const float direction[3], const float color[3], double weight)
 {
@@ -87,14 +87,14 @@ static gbt_status add_view(baking *b, frame *f, const decoder *d, const gbt_came
     GBT_TRY(frame_render(f, frame_neural(b->a, d), &sparse, settings, true, err));
     GBT_TRY(frame_blend_weights(f, err));
     for (size_t v = 0; v < f->visible_count; v++)
-        b->visible[f->visible[v]]++;
+        b->anchor_views[f->visible[v]]++;
     const gaussians *g = &f->gaussians;
     const size_t k_count = (size_t)b->a->offset_count;
     for (size_t i = 0; i < g->count; i++) {
         const size_t row = f->tape.slot[i] / k_count, k = f->tape.slot[i] % k_count;
         sums *s = &b->sums[f->visible[row] * k_count + k];
         const double weight = (double)f->blend_weight[i];
-        s->kept++;
+        s->decoded_views++;
         s->mean[0] = g->mean_x[i];
         s->mean[1] = g->mean_y[i];
         s->mean[2] = g->mean_z[i];
@@ -207,9 +207,11 @@ static void solve_shape(const sums *s, float scale_log[3], float quat[4])
 
 /* The mean opacity over the views in which the anchor was decoded. In views where this Gaussian was not made,
    its opacity counts as 0 and its weight, had it been opaque, as the mean of the other views. */
-static float opacity_of(const sums *s, uint32_t visible)
+static float opacity_of(const sums *s, uint32_t anchor_views)
 {
-    const double missed = visible > s->kept && s->kept > 0 ? (double)(visible - s->kept) / s->kept : 0;
+    const double missed = anchor_views > s->decoded_views && s->decoded_views > 0
+                              ? (double)(anchor_views - s->decoded_views) / s->decoded_views
+                              : 0;
     return s->weight > 0 ? (float)fmin(s->weight / (s->opaque * (1 + missed)), 1) : 0;
 }
 
@@ -239,7 +241,7 @@ static size_t choose(const baking *b, size_t count_max, ranked *list, bake_resul
     const size_t k_count = (size_t)b->a->offset_count, slots = b->a->count * k_count;
     size_t count = 0;
     for (size_t i = 0; i < slots; i++)
-        if (opacity_of(&b->sums[i], b->visible[i / k_count]) >= opacity_min)
+        if (opacity_of(&b->sums[i], b->anchor_views[i / k_count]) >= opacity_min)
             list[count++] = (ranked){b->sums[i].weight, i};
     out->unseen = slots - count;
     if (count_max == 0 || count <= count_max)
@@ -266,7 +268,7 @@ static gbt_status solve(const baking *b, const bake_def *def, bake_result *out, 
         const size_t slot = list[to].slot;
         const sums *s = &b->sums[slot];
         memcpy(cloud->mean + 3 * to, s->mean, sizeof s->mean);
-        cloud->opacity[to] = opacity_of(s, b->visible[slot / k_count]);
+        cloud->opacity[to] = opacity_of(s, b->anchor_views[slot / k_count]);
         solve_shape(s, cloud->scale_log + 3 * to, cloud->quat + 4 * to);
         solve_color(b, s, cloud->sh + to * TERMS * 3);
     }
@@ -279,13 +281,13 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
                       bake_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior >= 0 && def->prior <= 1))
+    if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior_weight >= 0 && def->prior_weight <= 1))
         return base_fail(err, GBT_ERR_ARGUMENT, "bake: degree %d, prior %g (wanted 0 to 3, 0 to 1)",
-                         def->sh_degree, def->prior);
+                         def->sh_degree, def->prior_weight);
     baking b = {.a = a, .functions = sh_count(def->sh_degree)};
     b.sums = mem_calloc(a->count * (size_t)a->offset_count, sizeof *b.sums, "Gaussians to bake", err);
-    b.visible = mem_calloc(a->count, sizeof *b.visible, "anchors to bake", err);
-    gbt_status status = b.sums == NULL || b.visible == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    b.anchor_views = mem_calloc(a->count, sizeof *b.anchor_views, "anchors to bake", err);
+    gbt_status status = b.sums == NULL || b.anchor_views == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     const frame_drawing drawing = f->draw;
     f->draw.renderer = GBT_RENDERER_TRACE;
     if (status == GBT_OK && camera_count > 0)
@@ -295,11 +297,12 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
         log_count("bake", i + 1, camera_count, (double)NAN);
     }
     f->draw = drawing;
-    if (status == GBT_OK && def->prior > 0)
-        status = add_directions(&b, f, d, middle_distance(a, d, cameras, camera_count), def->prior, err);
+    if (status == GBT_OK && def->prior_weight > 0)
+        status =
+            add_directions(&b, f, d, middle_distance(a, d, cameras, camera_count), def->prior_weight, err);
     if (status == GBT_OK)
         status = solve(&b, def, out, err);
     mem_free(b.sums);
-    mem_free(b.visible);
+    mem_free(b.anchor_views);
     return status;
 }

@@ -8,9 +8,9 @@
 #include "frame/frame.h"
 
 typedef struct bake_def {
-    int sh_degree; /* of the colours' spherical harmonics, [0, 3]. Default 3 */
-    double prior; /* [0, 1]: weight of directions without a camera, relative to those with one. Without it the
-                     fitted colours take extreme values there. Default 0.3 */
+    int sh_degree;       /* of the colours' spherical harmonics, [0, 3]. Default 3 */
+    double prior_weight; /* [0, 1]: weight of directions without a camera, relative to those with one. Without
+                     it the fitted colours take extreme values there. Default 0.3 */
     size_t count_max; /* keep only this many Gaussians, those with the largest weights; 0: all. Default 0 */
 } bake_def;
 bake_def bake_def_default(void);
@@ -27,8 +27,8 @@ typedef struct bake_result {
  * with the Gaussian's contribution to the picture (the sum of T alpha over every second ray in both
  * directions): opacity as the sum of the weights divided by the sum of what they would be if the Gaussian
  * were opaque, shape as the mean covariance, and colour as a least-squares fit of spherical harmonics. 64
- * directions spread over the sphere are added to that fit with the weight `prior`. The sum of a Gaussian's
- * weights over all cameras ranks it for `count_max`.
+ * directions spread over the sphere are added to that fit with the weight `prior_weight`. The sum of a
+ * Gaussian's weights over all cameras ranks it for `count_max`.
  *
  * @param f       [in,out] any frame; its drawing settings are used, except for the renderer: weights are
  *                         always ray traced

@@ -41,7 +41,7 @@ typedef struct exported {
                                     floats unchanged */
     const gaussian_cloud *baked; /* what was written */
     float near;                  /* near distance with which readers of the file draw it */
-    double to_bake;              /* PSNR between `back` and `baked` */
+    double to_baked;             /* PSNR between `back` and `baked` */
     double to_model, to_photo;
     double with_near; /* to_model, had the file stored the near distance */
     long long bytes;
@@ -60,11 +60,11 @@ typedef struct exporting {
     size_t view_count, *views; /* views to compare */
     size_t photo_count;        /* number of these that have a photo with valid pixels */
     bool held_out;
-    frame frame, bake;    /* render `shown` and `baked` of an output */
-    const char *folder;   /* the output that is a result folder, or NULL */
-    image_scores *scores; /* [view_count], for the result folder */
-    lpips *net;           /* for the folder, or NULL */
-    lpips_scores *lpips;  /* [view_count], likewise */
+    frame frame, baked_frame; /* render `shown` and `baked` of an output */
+    const char *folder;       /* the output that is a result folder, or NULL */
+    image_scores *scores;     /* [view_count], for the result folder */
+    lpips *net;               /* for the folder, or NULL */
+    lpips_scores *lpips;      /* [view_count], likewise */
 } exporting;
 
 /* ---- from a run to Gaussians ---- */
@@ -114,7 +114,7 @@ static gbt_status open_run(exporting *e, const char *run, gbt_error *err)
     GBT_TRY(loaded_run_open(run, e->def->data, 0, r, err));
     GBT_TRY(choose_views(e, err));
     memcpy(e->origin, r->model.origin, sizeof e->origin);
-    e->frame.draw.footprint = e->bake.draw.footprint = r->frame.draw.footprint;
+    e->frame.draw.footprint = e->baked_frame.draw.footprint = r->frame.draw.footprint;
     /* The colour behind photos with an alpha channel is not part of the scene: it gets no backdrop. */
     e->viewer = r->settings;
     float laid_on[3];
@@ -184,8 +184,8 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
                                const unsigned char *valid, gbt_error *err)
 {
     const double share = 1 / (double)e->view_count;
-    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *bake = &e->bake.rgb;
-    const gaussian_cloud *drawn = NULL; /* the cloud that `bake` shows */
+    image *neural = &e->run.frame.rgb, *shown = &e->frame.rgb, *baked = &e->baked_frame.rgb;
+    const gaussian_cloud *drawn = NULL; /* the cloud that `baked` shows */
     const trace_settings viewer = viewer_at(e, index, e->run.settings.t_near);
     image_quantize(photo);
     image_quantize(neural);
@@ -198,11 +198,11 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &viewer, false, err));
         image_quantize(shown);
         if (f->shown != f->baked && drawn != f->baked) {
-            GBT_TRY(frame_render(&e->bake, frame_plain(f->baked), camera, &viewer, false, err));
-            image_quantize(bake);
+            GBT_TRY(frame_render(&e->baked_frame, frame_plain(f->baked), camera, &viewer, false, err));
+            image_quantize(baked);
             drawn = f->baked;
         }
-        f->to_bake += f->shown != f->baked ? share * metric_psnr(shown, bake) : 0;
+        f->to_baked += f->shown != f->baked ? share * metric_psnr(shown, baked) : 0;
         f->with_near += share * metric_psnr(shown, neural);
         if (f->near != e->run.settings.t_near) { /* readers draw the file without the near distance if it
                                                     cannot store it */
@@ -371,7 +371,7 @@ static json_t *file_to_json(const exporting *e, const exported *f)
                             "sh_degree", f->shown->sh_degree);
     if (e->baked && e->view_count > 0) {
         if (f->shown != f->baked)
-            json_object_set_new(row, "psnr_to_bake", json_number(f->to_bake));
+            json_object_set_new(row, "psnr_to_bake", json_number(f->to_baked));
         json_object_set_new(row, "psnr_to_model", json_real(f->to_model));
         if (!e->run.def.exposure) {
             json_object_set_new(row, "psnr_to_photos", json_number(f->to_photo));
@@ -454,7 +454,7 @@ static void exporting_free(exporting *e)
     mem_free(e->lpips);
     lpips_close(e->net);
     frame_free(&e->frame);
-    frame_free(&e->bake);
+    frame_free(&e->baked_frame);
     loaded_run_close(&e->run);
     mem_free(e);
 }

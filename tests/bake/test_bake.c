@@ -73,7 +73,7 @@ static void bake_world(world *w, int degree, double prior, bake_result *out)
 {
     bake_def def = bake_def_default();
     def.sh_degree = degree;
-    def.prior = prior;
+    def.prior_weight = prior;
     assert_ok(bake_cloud(&w->f, &w->a, &w->d, w->cameras, CAMERAS, w->of_cameras, &def, out, NULL));
     assert_int_equal(out->cloud.count + out->unseen, ANCHORS * OFFSETS);
     assert_int_equal(w->f.draw.pixel_step, 0);

@@ -84,17 +84,17 @@ gbt_status study_grid_report(study_grid *g, const bool *wanted, study_grid_run *
 {
     const size_t size = (size_t)gbt_cluster_size(), rank = (size_t)gbt_cluster_rank();
     gbt_status status = GBT_OK;
-    cluster_apart(true);
+    cluster_stand_alone(true);
     if (size > 1)
         status = fill(g, wanted, run, study, folder, rank, size, err);
-    cluster_apart(false);
+    cluster_stand_alone(false);
     status = cluster_agree(status, err);
     if (status == GBT_OK && rank == 0) {
-        cluster_apart(true);
+        cluster_stand_alone(true);
         status = fill(g, wanted, run, study, folder, 0, 1, err);
         if (status == GBT_OK)
             status = study_output_save(output, study, folder, out, err);
-        cluster_apart(false);
+        cluster_stand_alone(false);
     }
     study_grid_close(g);
     return cluster_follow(status, err);

@@ -20,16 +20,16 @@ enum { PATH_SIZE = 4096, WORD = 4 };
 
 static const cluster_module *module;
 static int own_rank, own_size = 1;
-static bool apart;                 /* cluster_apart() */
+static bool stands_alone;          /* cluster_stand_alone() */
 static gbt_status agreed = GBT_OK; /* the last failure that all processes know of */
 static int own_stderr = -1;        /* the original stderr of a process whose output is discarded; else -1 */
 static cluster_traffic traffic;
 
-static bool is_alone(void) { return module == NULL || apart; }
+static bool is_alone(void) { return module == NULL || stands_alone; }
 
 int gbt_cluster_rank(void) { return is_alone() ? 0 : own_rank; }
 int gbt_cluster_size(void) { return is_alone() ? 1 : own_size; }
-void cluster_apart(bool on) { apart = on; }
+void cluster_stand_alone(bool on) { stands_alone = on; }
 cluster_traffic cluster_traffic_so_far(void) { return traffic; }
 
 /* ---- the module ---- */
@@ -134,12 +134,13 @@ void gbt_cluster_close(int exit_code, const char *error)
 
 /* Convert counts and offsets to int, which MPI uses: at most 8 GB in 32-bit words. Larger messages end the
    run. */
-static void places_of(const size_t *counts, int out_counts[CLUSTER_SIZE_MAX], int places[CLUSTER_SIZE_MAX])
+static void message_offsets(const size_t *counts, int out_counts[CLUSTER_SIZE_MAX],
+                            int offsets[CLUSTER_SIZE_MAX])
 {
     size_t sum = 0;
     for (int i = 0; i < own_size; i++) {
         out_counts[i] = (int)counts[i];
-        places[i] = (int)sum;
+        offsets[i] = (int)sum;
         sum += counts[i];
     }
     if (sum <= INT_MAX)
@@ -171,9 +172,9 @@ void cluster_gather(const void *mine, const size_t *counts, void *all)
         return;
     }
     const double start = clock_wall();
-    int n[CLUSTER_SIZE_MAX], places[CLUSTER_SIZE_MAX];
-    places_of(counts, n, places);
-    module->gather(mine, n[own_rank], all, n, places);
+    int n[CLUSTER_SIZE_MAX], offsets[CLUSTER_SIZE_MAX];
+    message_offsets(counts, n, offsets);
+    module->gather(mine, n[own_rank], all, n, offsets);
     count(sum_of_others(counts), start);
 }
 
@@ -184,11 +185,11 @@ void cluster_exchange(const void *send, const size_t *send_counts, void *all, co
         return;
     }
     const double start = clock_wall();
-    int send_n[CLUSTER_SIZE_MAX], send_places[CLUSTER_SIZE_MAX], n[CLUSTER_SIZE_MAX],
-        places[CLUSTER_SIZE_MAX];
-    places_of(send_counts, send_n, send_places);
-    places_of(counts, n, places);
-    module->exchange(send, send_n, send_places, all, n, places);
+    int send_n[CLUSTER_SIZE_MAX], send_offsets[CLUSTER_SIZE_MAX], n[CLUSTER_SIZE_MAX],
+        offsets[CLUSTER_SIZE_MAX];
+    message_offsets(send_counts, send_n, send_offsets);
+    message_offsets(counts, n, offsets);
+    module->exchange(send, send_n, send_offsets, all, n, offsets);
     count(sum_of_others(send_counts), start);
 }
 
@@ -204,21 +205,21 @@ void cluster_broadcast(void *data, size_t bytes)
 /* ---- failures ---- */
 
 /* A failure as a message; its size is a whole number of words. */
-typedef struct told {
+typedef struct status_message {
     int32_t status;
     char text[sizeof((gbt_error){0}.text)];
-} told;
-_Static_assert(sizeof(told) % WORD == 0, "messages are words");
+} status_message;
+_Static_assert(sizeof(status_message) % WORD == 0, "messages are words");
 
-static told tell(gbt_status status, const gbt_error *err)
+static status_message message_of_status(gbt_status status, const gbt_error *err)
 {
-    told t = {.status = (int32_t)status};
+    status_message t = {.status = (int32_t)status};
     if (status != GBT_OK && err != NULL)
         memcpy(t.text, err->text, sizeof t.text);
     return t;
 }
 
-static gbt_status hear(const told *t, gbt_error *err)
+static gbt_status status_of_message(const status_message *t, gbt_error *err)
 {
     if (t->status == GBT_OK)
         return GBT_OK;
@@ -236,7 +237,7 @@ gbt_status cluster_agree(gbt_status status, gbt_error *err)
         return status;
     int32_t all[CLUSTER_SIZE_MAX];
     size_t counts[CLUSTER_SIZE_MAX];
-    told mine = tell(status, err), first;
+    status_message mine = message_of_status(status, err), first;
     for (int i = 0; i < own_size; i++)
         counts[i] = 1;
     cluster_gather(&mine.status, counts, all);
@@ -248,14 +249,14 @@ gbt_status cluster_agree(gbt_status status, gbt_error *err)
     for (int i = 0; i < own_size; i++)
         counts[i] = i == failed ? sizeof mine / WORD : 0;
     cluster_gather(&mine, counts, &first);
-    return hear(&first, err);
+    return status_of_message(&first, err);
 }
 
 gbt_status cluster_follow(gbt_status status, gbt_error *err)
 {
     if (is_alone())
         return status;
-    told first = tell(status, err);
+    status_message first = message_of_status(status, err);
     cluster_broadcast(&first, sizeof first);
-    return hear(&first, err);
+    return status_of_message(&first, err);
 }

@@ -40,7 +40,7 @@ gbt_status cluster_agree(gbt_status status, gbt_error *err);
 gbt_status cluster_follow(gbt_status status, gbt_error *err);
 
 /** on: from now on this process works independently, as if it were alone; off: no longer. */
-void cluster_apart(bool on);
+void cluster_stand_alone(bool on);
 
 /** Bytes that this process has sent so far (or received, in calls where all processes get the same), and the
     seconds spent in these calls. */

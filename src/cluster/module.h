@@ -3,13 +3,13 @@
 #ifndef GBT_CLUSTER_MODULE_H
 #define GBT_CLUSTER_MODULE_H
 
-/* Counts and places (offsets) are in 32-bit words. */
+/* Counts and offsets are in 32-bit words. */
 typedef struct cluster_module {
     int version; /* CLUSTER_MODULE_VERSION */
     void (*open)(int *rank, int *size);
-    void (*gather)(const void *mine, int count, void *all, const int *counts, const int *places);
-    void (*exchange)(const void *send, const int *send_counts, const int *send_places, void *all,
-                     const int *counts, const int *places);
+    void (*gather)(const void *mine, int count, void *all, const int *counts, const int *offsets);
+    void (*exchange)(const void *send, const int *send_counts, const int *send_offsets, void *all,
+                     const int *counts, const int *offsets);
     void (*broadcast)(void *data, int count);
     void (*close)(void);
     void (*abort)(int exit_code);

@@ -16,15 +16,15 @@ static void join(int *rank, int *size)
     MPI_Comm_size(MPI_COMM_WORLD, size);
 }
 
-static void gather(const void *mine, int count, void *all, const int *counts, const int *places)
+static void gather(const void *mine, int count, void *all, const int *counts, const int *offsets)
 {
-    MPI_Allgatherv(mine, count, MPI_INT32_T, all, counts, places, MPI_INT32_T, MPI_COMM_WORLD);
+    MPI_Allgatherv(mine, count, MPI_INT32_T, all, counts, offsets, MPI_INT32_T, MPI_COMM_WORLD);
 }
 
-static void exchange(const void *send, const int *send_counts, const int *send_places, void *all,
-                     const int *counts, const int *places)
+static void exchange(const void *send, const int *send_counts, const int *send_offsets, void *all,
+                     const int *counts, const int *offsets)
 {
-    MPI_Alltoallv(send, send_counts, send_places, MPI_INT32_T, all, counts, places, MPI_INT32_T,
+    MPI_Alltoallv(send, send_counts, send_offsets, MPI_INT32_T, all, counts, offsets, MPI_INT32_T,
                   MPI_COMM_WORLD);
 }
 

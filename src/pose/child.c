@@ -22,7 +22,7 @@ static const double patience = 10; /* seconds from SIGINT to SIGKILL */
 
 /* Runs in the new process, where only async-signal-safe calls are allowed. It gets a process group of its
    own, so that Ctrl-C does not reach it directly but only once, from us. */
-static void become(const char *const *arguments, int log, int output, bool whole, int failure)
+static void become(const char *const *arguments, int log, int output, bool with_stderr, int failure)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     setpgid(0, 0);
@@ -32,7 +32,7 @@ static void become(const char *const *arguments, int log, int output, bool whole
     sigaction(SIGTERM, &usual, NULL);
     sigaction(SIGPIPE, &usual, NULL);
     if (nothing >= 0 && dup2(nothing, STDIN_FILENO) >= 0 && dup2(output, STDOUT_FILENO) >= 0 &&
-        dup2(whole ? output : log, STDERR_FILENO) >= 0)
+        dup2(with_stderr ? output : log, STDERR_FILENO) >= 0)
         execvp(arguments[0], (char *const *)arguments);
     const int code = errno;
     const ssize_t put = write(failure, &code, sizeof code);
@@ -45,7 +45,7 @@ static void close_both(int ends[2])
     close(ends[1]);
 }
 
-gbt_status child_start(child *c, const char *const *arguments, const char *log_path, bool whole,
+gbt_status child_start(child *c, const char *const *arguments, const char *log_path, bool with_stderr,
                        gbt_error *err)
 {
     *c = (child){.name = arguments[0], .log_path = log_path, .output = -1};
@@ -64,7 +64,7 @@ gbt_status child_start(child *c, const char *const *arguments, const char *log_p
     }
     c->process = fork();
     if (c->process == 0)
-        become(arguments, log, output[1], whole, failure[1]);
+        become(arguments, log, output[1], with_stderr, failure[1]);
     int code = c->process < 0 ? errno : 0;
     close(output[1]);
     close(failure[1]);
@@ -96,11 +96,11 @@ static void pass_on_stop(child *c)
 {
     if (!stop_signal_seen() || c->process <= 0)
         return;
-    if (!c->was_told) {
-        c->was_told = true;
-        c->told_at = clock_wall();
+    if (!c->stop_requested) {
+        c->stop_requested = true;
+        c->stop_requested_at = clock_wall();
         signal_all(c, SIGINT);
-    } else if (clock_wall() - c->told_at > patience) {
+    } else if (clock_wall() - c->stop_requested_at > patience) {
         signal_all(c, SIGKILL);
     }
 }
@@ -151,7 +151,7 @@ gbt_status child_end(child *c, const char *last, gbt_error *err)
     if (c->process <= 0)
         return GBT_OK;
     const int state = wait_for(c);
-    if (c->was_told || stop_signal_seen())
+    if (c->stop_requested || stop_signal_seen())
         return base_fail(err, GBT_ERR_INTERRUPTED, "interrupted: the same command goes on");
     if (WIFEXITED(state) && WEXITSTATUS(state) == 0)
         return GBT_OK;

@@ -14,8 +14,8 @@ typedef struct child {
     const char *log_path; /* borrowed */
     pid_t process;        /* 0: ended */
     int output;           /* the reading end of a pipe; -1: closed */
-    bool was_told;        /* it was asked to stop */
-    double told_at;
+    bool stop_requested;  /* it was asked to stop */
+    double stop_requested_at;
 } child;
 
 /**
@@ -23,10 +23,10 @@ typedef struct child {
  *
  * @param arguments [in] the program's name first, NULL last; borrowed for the call
  * @param log_path  [in] file to which stderr is appended; borrowed until child_end()
- * @param whole     [in] child_read() gets stderr as well as stdout; else stderr goes to the log
+ * @param with_stderr [in] child_read() gets stderr as well as stdout; else stderr goes to the log
  * @return GBT_OK; GBT_ERR_IO, also when the program is not installed; the message says how to install it
  */
-gbt_status child_start(child *c, const char *const *arguments, const char *log_path, bool whole,
+gbt_status child_start(child *c, const char *const *arguments, const char *log_path, bool with_stderr,
                        gbt_error *err);
 
 /** Read the next bytes of its output; 0 at the end. If stop_signal_seen(), the child gets SIGINT, and ten

@@ -64,37 +64,37 @@ static void begin_command(command_line *c, const job *j, const char *verb)
 
 /* ---- which version ---- */
 
-static void hear_extraction(const char *line, void *context)
+static void find_extraction_options(const char *line, void *context)
 {
-    dialect *d = context;
+    colmap_options *d = context;
     d->new_extraction = d->new_extraction || strstr(line, "FeatureExtraction.use_gpu") != NULL;
     d->camera_per_image = d->camera_per_image || strstr(line, "ImageReader.single_camera_per_image") != NULL;
 }
 
-static void hear_matching(const char *line, void *context)
+static void find_matching_options(const char *line, void *context)
 {
-    dialect *d = context;
+    colmap_options *d = context;
     d->new_matching = d->new_matching || strstr(line, "FeatureMatching.use_gpu") != NULL;
 }
 
-static void hear_mapper(const char *line, void *context)
+static void find_mapper_options(const char *line, void *context)
 {
-    dialect *d = context;
+    colmap_options *d = context;
     d->global_tolerance = d->global_tolerance || strstr(line, "Mapper.ba_global_function_tolerance") != NULL;
 }
 
-gbt_status colmap_find(const job *j, dialect *out, gbt_error *err)
+gbt_status colmap_find(const job *j, colmap_options *out, gbt_error *err)
 {
     static const char *const extraction[] = {"colmap", "feature_extractor", "-h", NULL};
     static const char *const matching[] = {"colmap", "exhaustive_matcher", "-h", NULL};
     static const char *const mapper[] = {"colmap", "mapper", "-h", NULL};
     char log_path[JOB_PATH_SIZE];
-    *out = (dialect){0};
+    *out = (colmap_options){0};
     GBT_TRY(job_path(j, "options.log", log_path, err));
     unlink(log_path);
-    GBT_TRY(child_run(extraction, log_path, hear_extraction, out, err));
-    GBT_TRY(child_run(matching, log_path, hear_matching, out, err));
-    return child_run(mapper, log_path, hear_mapper, out, err);
+    GBT_TRY(child_run(extraction, log_path, find_extraction_options, out, err));
+    GBT_TRY(child_run(matching, log_path, find_matching_options, out, err));
+    return child_run(mapper, log_path, find_mapper_options, out, err);
 }
 
 /* ---- progress ---- */
@@ -211,7 +211,7 @@ static gbt_status camera_of(const job *j, int group, uint32_t *camera, gbt_error
     return status;
 }
 
-static gbt_status extract_group(const job *j, const dialect *d, int group, progress *p, gbt_error *err)
+static gbt_status extract_group(const job *j, const colmap_options *d, int group, progress *p, gbt_error *err)
 {
     char list[JOB_PATH_SIZE], log_path[JOB_PATH_SIZE], model[CHOICE_TEXT_SIZE];
     size_t count;
@@ -239,7 +239,7 @@ static gbt_status extract_group(const job *j, const dialect *d, int group, progr
     return status;
 }
 
-static gbt_status extract(const job *j, const dialect *d, gbt_error *err)
+static gbt_status extract(const job *j, const colmap_options *d, gbt_error *err)
 {
     char log_path[JOB_PATH_SIZE], model[CHOICE_TEXT_SIZE];
     GBT_TRY(job_path(j, "features.log", log_path, err));
@@ -271,7 +271,8 @@ static gbt_pose_matcher matcher_of(const job *j, size_t with_position)
 }
 
 /* @param steps [in] number of steps that its progress will count, as far as known in advance */
-static gbt_status run_matcher(const job *j, const dialect *d, command_line *c, uint64_t steps, gbt_error *err)
+static gbt_status run_matcher(const job *j, const colmap_options *d, command_line *c, uint64_t steps,
+                              gbt_error *err)
 {
     char log_path[JOB_PATH_SIZE];
     progress p = begin("matching", steps);
@@ -284,7 +285,7 @@ static gbt_status run_matcher(const job *j, const dialect *d, command_line *c, u
 
 /* Match frames evenly spaced over the film exhaustively: sequential matching alone does not notice when the
    camera returns to a place. */
-static gbt_status match_key_frames(const job *j, const dialect *d, gbt_error *err)
+static gbt_status match_key_frames(const job *j, const colmap_options *d, gbt_error *err)
 {
     char path[JOB_PATH_SIZE];
     sink list = {.err = err};
@@ -308,7 +309,7 @@ static gbt_status match_key_frames(const job *j, const dialect *d, gbt_error *er
     return run_matcher(j, d, &c, 1, err);
 }
 
-static gbt_status match(const job *j, const dialect *d, gbt_error *err)
+static gbt_status match(const job *j, const colmap_options *d, gbt_error *err)
 {
     static const char *const verbs[] = {NULL, "exhaustive_matcher", "sequential_matcher", "spatial_matcher"};
     database *base;
@@ -366,7 +367,7 @@ static gbt_status remove_models(const job *j, gbt_error *err)
     return GBT_OK;
 }
 
-static gbt_status map(const job *j, const dialect *d, gbt_error *err)
+static gbt_status map(const job *j, const colmap_options *d, gbt_error *err)
 {
     char log_path[JOB_PATH_SIZE];
     gbt_error why = {0};
@@ -390,7 +391,7 @@ static gbt_status map(const job *j, const dialect *d, gbt_error *err)
     return job_set_done(j, "mapping", err);
 }
 
-gbt_status colmap_stages(const job *j, const dialect *d, gbt_error *err)
+gbt_status colmap_stages(const job *j, const colmap_options *d, gbt_error *err)
 {
     if (!job_is_done(j, "features"))
         GBT_TRY(extract(j, d, err));

@@ -8,15 +8,15 @@
 /** How the installed COLMAP names its options. Version 4 renamed SiftExtraction.use_gpu to
     FeatureExtraction.use_gpu, and the same for matching; the other fields are options that older versions
     lack. */
-typedef struct dialect {
+typedef struct colmap_options {
     bool new_extraction, new_matching;
     bool camera_per_image, global_tolerance;
-} dialect;
+} colmap_options;
 
 /** Find out what the installed COLMAP supports; GBT_ERR_IO when it is not installed. */
-gbt_status colmap_find(const job *j, dialect *out, gbt_error *err);
+gbt_status colmap_find(const job *j, colmap_options *out, gbt_error *err);
 
 /** Run all stages that are not finished. Afterwards DATA/colmap/models contains the models, possibly none. */
-gbt_status colmap_stages(const job *j, const dialect *d, gbt_error *err);
+gbt_status colmap_stages(const job *j, const colmap_options *d, gbt_error *err);
 
 #endif

@@ -210,7 +210,7 @@ static gbt_status lock(const job *j, int *out, gbt_error *err)
 
 static gbt_status find_poses(job *j, gbt_error *err)
 {
-    dialect colmap;
+    colmap_options colmap;
     GBT_TRY(colmap_find(j, &colmap, err)); /* fail now, not after minutes of decoding a film */
     if (j->is_film && !file_exists(j->images))
         GBT_TRY(film_to_photos(j, err));

@@ -171,7 +171,7 @@ static void build(world *w)
 
 /** Two of three cameras walk along the streets in turn, looking ahead and to one side. The third flies over
     the blocks in rows and looks down. Any eight consecutive views include both kinds. */
-static void stand(int view, int view_count, double eye[3], double target[3])
+static void place_camera(int view, int view_count, double eye[3], double target[3])
 {
     const double half = 0.5 * (double)pitch * BLOCKS, part = (view + 0.5) / view_count;
     if (view % 3 == 2) {
@@ -206,9 +206,9 @@ const recipe recipe_district = {
              "the roofs; "
              "each sees a small part of it. A sphere of 190 units around it carries the sky.",
     .build = build,
-    .stand = stand,
+    .place_camera = place_camera,
     .jitter = 0.2f,
     .focal_widths = 0.70f,
-    .sight = 60,
+    .view_distance = 60,
     .bake_rays = 32,
 };

@@ -157,8 +157,8 @@ static gbt_camera place_camera(const recipe *r, const gbt_make_scene_def *def, i
            target[3], forward[3];
     for (int k = 0; k < 3; k++)
         target[k] = (double)r->target[k];
-    if (r->stand != NULL)
-        r->stand(view, def->view_count, eye, target);
+    if (r->place_camera != NULL)
+        r->place_camera(view, def->view_count, eye, target);
     for (int k = 0; k < 3; k++) {
         eye[k] += (double)r->jitter * rng_normal(def->seed, STREAM_CAMERA + (uint64_t)k, (uint64_t)view);
         forward[k] =
@@ -308,7 +308,7 @@ static gbt_status write_scene(const world *w, const recipe *r, const gbt_make_sc
                                             .per_view = per_view,
                                             .wanted = (size_t)def->points,
                                             .point_noise = def->point_noise,
-                                            .sight = r->sight,
+                                            .view_distance = r->view_distance,
                                             .seed = def->seed},
                               folder, err);
     if (status == GBT_OK && def->gaussians > 0) {

@@ -18,10 +18,10 @@ typedef struct recipe {
     recipe_ring rings[2];
     float target[3];
     /* where camera `view` of `view_count` stands and what it looks at; NULL: on the rings */
-    void (*stand)(int view, int view_count, double eye[3], double target[3]);
-    float jitter;       /* standard deviation of eye and target, scene units */
-    float focal_widths; /* focal length in image widths */
-    float sight;        /* views see no points beyond this distance; 0: no limit */
+    void (*place_camera)(int view, int view_count, double eye[3], double target[3]);
+    float jitter;        /* standard deviation of eye and target, scene units */
+    float focal_widths;  /* focal length in image widths */
+    float view_distance; /* views see no points beyond this distance; 0: no limit */
     int bake_rays;
 } recipe;
 

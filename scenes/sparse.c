@@ -79,7 +79,7 @@ static bool sees(const search *q, size_t view, const double point[3], const floa
     double to_point[3], pixel[2];
     for (int k = 0; k < 3; k++)
         to_point[k] = point[k] - camera->center[k];
-    if (q->def->sight > 0 && dvec_length(to_point) > (double)q->def->sight)
+    if (q->def->view_distance > 0 && dvec_length(to_point) > (double)q->def->view_distance)
         return false;
     if (!gbt_camera_pixel(camera, point, pixel))
         return false;

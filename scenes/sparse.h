@@ -31,10 +31,10 @@ typedef struct sparse_def {
     size_t view_count;
     const sparse_seed *seeds; /* [view_count][per_view] */
     size_t per_view;
-    size_t wanted;      /* points, at most */
-    double point_noise; /* standard deviation of positions per axis, as a fraction of the distance to the
-                           nearest view */
-    float sight;        /* a view sees no points beyond this distance; 0: no limit */
+    size_t wanted;       /* points, at most */
+    double point_noise;  /* standard deviation of positions per axis, as a fraction of the distance to the
+                            nearest view */
+    float view_distance; /* a view sees no points beyond this distance; 0: no limit */
     uint64_t seed;
 } sparse_def;
 

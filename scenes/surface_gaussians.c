@@ -20,7 +20,7 @@ static const double sh_0 = 0.28209479177387814;
 
 typedef struct spread {
     const world *w;
-    double *end; /* [triangle_count] cumulative weights */
+    double *cumulative_weight; /* [triangle_count] */
     size_t count, first;
     uint64_t seed;
     sink *rows; /* [BATCH] */
@@ -56,7 +56,7 @@ static void weigh_triangles(spread *s)
             n[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
         const double area = 0.5 * sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         sum += area * (shines(s->w, i) ? (double)sky_share : 1);
-        s->end[i] = sum;
+        s->cumulative_weight[i] = sum;
     }
 }
 
@@ -66,7 +66,7 @@ static size_t triangle_at(const spread *s, double at)
     size_t low = 0, high = s->w->triangle_count - 1;
     while (low < high) {
         const size_t middle = low + (high - low) / 2;
-        if (s->end[middle] > at)
+        if (s->cumulative_weight[middle] > at)
             high = middle;
         else
             low = middle + 1;
@@ -102,7 +102,7 @@ static void put_row(const spread *s, size_t number, sink *out)
 {
     static const float lamp_center[2] = {0, 0};
     uint32_t words[4];
-    const double all = s->end[s->w->triangle_count - 1], share = all / (double)s->count;
+    const double all = s->cumulative_weight[s->w->triangle_count - 1], share = all / (double)s->count;
     rng_philox(s->seed, STREAM_PLACE, number, words);
     const size_t triangle = triangle_at(s, share * ((double)number + (double)words[2] * 0x1p-32));
     float u = (float)(words[0] >> 8) * 0x1p-24f, v = (float)(words[1] >> 8) * 0x1p-24f, rgb[3];
@@ -189,9 +189,11 @@ gbt_status surface_gaussians_write(const world *w, const char *path, size_t coun
 {
     large_file *file = mem_calloc(1, sizeof *file, "Gaussians of surfaces", err);
     spread s = {.w = w, .count = count, .seed = seed};
-    s.end = mem_alloc(w->triangle_count, sizeof *s.end, "Gaussians of surfaces", err);
+    s.cumulative_weight =
+        mem_alloc(w->triangle_count, sizeof *s.cumulative_weight, "Gaussians of surfaces", err);
     s.rows = mem_calloc(BATCH, sizeof *s.rows, "Gaussians of surfaces", err);
-    gbt_status status = file == NULL || s.end == NULL || s.rows == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    gbt_status status =
+        file == NULL || s.cumulative_weight == NULL || s.rows == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
     if (status == GBT_OK) {
         weigh_triangles(&s);
         status = large_file_create(path, file, err);
@@ -207,7 +209,7 @@ gbt_status surface_gaussians_write(const world *w, const char *path, size_t coun
     for (int b = 0; b < BATCH && s.rows != NULL; b++)
         sink_free(&s.rows[b]);
     mem_free(s.rows);
-    mem_free(s.end);
+    mem_free(s.cumulative_weight);
     mem_free(file);
     return status;
 }

@@ -87,11 +87,11 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
 }
 
 /* The pose as the file gives it, in world coordinates. Missing fields keep the values set before. */
-typedef struct stand {
+typedef struct file_pose {
     double origin[3], target[3], up[3];
-} stand;
+} file_pose;
 
-static gbt_status take_pose(const json_fields *r, bool needed, const double origin[3], stand *at,
+static gbt_status take_pose(const json_fields *r, bool needed, const double origin[3], file_pose *at,
                             gbt_camera *camera)
 {
     GBT_TRY(json_field_vector(r, "origin", needed, at->origin));
@@ -109,7 +109,7 @@ static gbt_status take_pose(const json_fields *r, bool needed, const double orig
                 : json_field_fail(r, "up", "is 0, or along the view");
 }
 
-static gbt_status take_shutter(const json_fields *r, const double origin[3], const stand *start,
+static gbt_status take_shutter(const json_fields *r, const double origin[3], const file_pose *start,
                                ray_shot *shot)
 {
     static const char *const directions[] = {"rows", "columns"};
@@ -123,7 +123,7 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     if (!json_is_object(end))
         return json_field_fail(r, "end", "wanted an object with origin, target or up");
     const json_fields inner = {r->path, "end.", end, r->err};
-    stand at = *start;
+    file_pose at = *start;
     GBT_TRY(json_field_names(&inner, " origin target up "));
     gbt_camera last = shot->camera;
     GBT_TRY(take_pose(&inner, false, origin, &at, &last));
@@ -171,7 +171,7 @@ gbt_status camera_file_take(const json_fields *fields, const double origin[3], c
     GBT_TRY(json_field_names(fields,
                              " origin target up model width height fov_x_deg view_width aperture focus "
                              "samples seed end shutter rays near_clip far_clip "));
-    stand start = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+    file_pose start = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     GBT_TRY(take_lens(fields, &camera));
     GBT_TRY(take_pose(fields, true, origin, &start, &camera));
     out->shot = ray_shot_of(&camera);

@@ -63,48 +63,48 @@ static gbt_status render_reference(loaded_run *r, const ray_shot *shot, gbt_erro
 }
 
 /* The open run, what is inserted into it, and how it is drawn. */
-typedef struct studio {
+typedef struct render_job {
     loaded_run run;
     insert_scene insert;
     unsigned outputs; /* bits of render_outputs_parse() */
     bool in_double;   /* by the double-precision reference */
     bool together;    /* all processes draw each picture: deal_out() */
-} studio;
+} render_job;
 
 /* Distribute pictures over the processes. If there are fewer pictures than processes and the scene is drawn
    by cells, all processes draw each picture together, each some of its cells. */
-static void deal_out(studio *st, size_t pictures)
+static void deal_out(render_job *job, size_t pictures)
 {
-    st->together = st->run.cells.count > 0 && pictures < (size_t)gbt_cluster_size();
+    job->together = job->run.cells.count > 0 && pictures < (size_t)gbt_cluster_size();
 }
 
-static bool is_own(const studio *st, size_t index)
+static bool is_own(const render_job *job, size_t index)
 {
-    return st->together || index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank();
+    return job->together || index % (size_t)gbt_cluster_size() == (size_t)gbt_cluster_rank();
 }
 
 /* Render into run.frame.rgb. */
-static gbt_status draw(studio *st, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
+static gbt_status draw(render_job *job, const ray_shot *shot, const gbt_render_def *def, gbt_error *err)
 {
-    loaded_run *r = &st->run;
+    loaded_run *r = &job->run;
     if (r->cells.count > 0)
-        return (st->together ? cell_draw_together : cell_draw)(&r->cell_drawer, &r->cells, shot, &r->settings,
-                                                               r->frame.draw.footprint, def->memory,
-                                                               &r->frame.rgb, err);
-    const frame_tracer tracer = {.trace = insert_trace, .context = &st->insert, .reach = st->insert.reach};
+        return (job->together ? cell_draw_together : cell_draw)(&r->cell_drawer, &r->cells, shot,
+                                                                &r->settings, r->frame.draw.footprint,
+                                                                def->memory, &r->frame.rgb, err);
+    const frame_tracer tracer = {.trace = insert_trace, .context = &job->insert, .reach = job->insert.reach};
     GBT_TRY(frame_render_with(&r->frame, loaded_run_subject(r), shot, &r->settings,
                               def->insert != NULL ? &tracer : NULL, err));
-    if (st->in_double)
+    if (job->in_double)
         GBT_TRY(render_reference(r, shot, err));
     return GBT_OK;
 }
 
 /* A scene that is not drawn by cells is drawn in full even if it exceeds the memory limit; only afterwards is
    the excess reported. */
-static gbt_status check_memory(const studio *st, const gbt_render_def *def, gbt_error *err)
+static gbt_status check_memory(const render_job *job, const gbt_render_def *def, gbt_error *err)
 {
     const size_t peak = mem_peak_bytes();
-    if (def->memory == 0 || peak <= def->memory || st->run.cells.count > 0)
+    if (def->memory == 0 || peak <= def->memory || job->run.cells.count > 0)
         return GBT_OK;
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
@@ -112,18 +112,18 @@ static gbt_status check_memory(const studio *st, const gbt_render_def *def, gbt_
         def->memory >> 20, (peak >> 20) + 1);
 }
 
-static gbt_status write_one(studio *st, const ray_shot *shot, const char *out, const char *name,
+static gbt_status write_one(render_job *job, const ray_shot *shot, const char *out, const char *name,
                             const gbt_render_def *def, gbt_error *err)
 {
     char file[1100], path[4096];
-    loaded_run *r = &st->run;
+    loaded_run *r = &job->run;
     snprintf(file, sizeof file, "%s.%s", name, CHOICE_NAME(GBT_PICTURE_FORMAT_NAMES, def->format));
     GBT_TRY(file_join(path, sizeof path, out, file, err));
     GBT_TRY(image_write(path, &r->frame.rgb, err));
-    return render_outputs_write(r, shot, st->outputs, out, name, err);
+    return render_outputs_write(r, shot, job->outputs, out, name, err);
 }
 
-static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, const char *name,
+static gbt_status render_one(render_job *job, const ray_shot *shot, const char *out, const char *name,
                              const gbt_render_def *def, gbt_error *err)
 {
     const gbt_camera *c = &shot->camera;
@@ -131,10 +131,10 @@ static gbt_status render_one(studio *st, const ray_shot *shot, const char *out, 
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%s: a picture of %d x %d pixels (wanted at most %lld pixels)", name, c->width,
                          c->height, (long long)(IMAGE_SAMPLES_MAX / 3));
-    GBT_TRY(draw(st, shot, def, err));
-    if (!st->together)
-        return write_one(st, shot, out, name, def, err);
-    return cluster_follow(cluster_leads() ? write_one(st, shot, out, name, def, err) : GBT_OK, err);
+    GBT_TRY(draw(job, shot, def, err));
+    if (!job->together)
+        return write_one(job, shot, out, name, def, err);
+    return cluster_follow(cluster_leads() ? write_one(job, shot, out, name, def, err) : GBT_OK, err);
 }
 
 static bool is_wanted(const scene_view *view, gbt_split split)
@@ -142,15 +142,15 @@ static bool is_wanted(const scene_view *view, gbt_split split)
     return split == GBT_SPLIT_ALL || view->is_test == (split == GBT_SPLIT_TEST);
 }
 
-static gbt_status render_own_views(studio *st, const char *out, const gbt_render_def *def, size_t wanted,
+static gbt_status render_own_views(render_job *job, const char *out, const gbt_render_def *def, size_t wanted,
                                    gbt_error *err)
 {
-    loaded_run *r = &st->run;
+    loaded_run *r = &job->run;
     size_t index = 0;
     log_count("render", 0, wanted, (double)NAN);
     for (size_t i = 0; i < r->scene.view_count; i++) {
         const scene_view *view = &r->scene.views[i];
-        if (!is_wanted(view, def->split) || !is_own(st, index++))
+        if (!is_wanted(view, def->split) || !is_own(job, index++))
             continue;
         char name[FILE_NAME_SIZE];
         loaded_run_view_name(r, i, name);
@@ -158,7 +158,7 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
         const ray_shot shot = ray_shot_of(&camera);
         const trace_settings of_run = r->settings;
         r->settings = loaded_run_settings(r, i);
-        const gbt_status status = render_one(st, &shot, out, name, def, err);
+        const gbt_status status = render_one(job, &shot, out, name, def, err);
         r->settings = of_run;
         GBT_TRY(status);
         log_count("render", index, wanted, (double)NAN);
@@ -166,17 +166,17 @@ static gbt_status render_own_views(studio *st, const char *out, const gbt_render
     return GBT_OK;
 }
 
-static gbt_status render_views(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_views(render_job *job, const char *out, const gbt_render_def *def, gbt_error *err)
 {
-    const scene *s = &st->run.scene;
+    const scene *s = &job->run.scene;
     size_t wanted = 0;
     for (size_t i = 0; i < s->view_count; i++)
         wanted += is_wanted(&s->views[i], def->split);
     if (wanted == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: no views in this split (of %zu)", s->folder,
                          s->view_count);
-    deal_out(st, wanted);
-    GBT_TRY(cluster_agree(render_own_views(st, out, def, wanted, err), err));
+    deal_out(job, wanted);
+    GBT_TRY(cluster_agree(render_own_views(job, out, def, wanted, err), err));
     log_info("%zu views rendered into %s", wanted, out);
     return GBT_OK;
 }
@@ -191,15 +191,15 @@ static void camera_name(const char *path, char *out, size_t size)
         *dot = '\0';
 }
 
-static gbt_status render_camera(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_camera(render_job *job, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     camera_file file = {0};
     char name[1024];
     camera_name(def->camera, name, sizeof name);
-    gbt_status status = cluster_agree(camera_file_read(def->camera, st->run.model.origin, &file, err), err);
-    deal_out(st, 1);
-    if (status == GBT_OK && is_own(st, 0))
-        status = render_one(st, &file.shot, out, name, def, err);
+    gbt_status status = cluster_agree(camera_file_read(def->camera, job->run.model.origin, &file, err), err);
+    deal_out(job, 1);
+    if (status == GBT_OK && is_own(job, 0))
+        status = render_one(job, &file.shot, out, name, def, err);
     status = cluster_agree(status, err);
     if (status == GBT_OK)
         log_info("%s rendered into %s", name, out);
@@ -207,15 +207,15 @@ static gbt_status render_camera(studio *st, const char *out, const gbt_render_de
     return status;
 }
 
-static gbt_status render_frames(studio *st, const camera_path *path, const char *out,
+static gbt_status render_frames(render_job *job, const camera_path *path, const char *out,
                                 const gbt_render_def *def, gbt_error *err)
 {
     log_count("render", 0, path->count, (double)NAN);
     for (size_t i = 0; i < path->count; i++) {
         char name[32];
         snprintf(name, sizeof name, "frame_%05zu", i + 1);
-        if (is_own(st, i))
-            GBT_TRY(render_one(st, &path->shots[i], out, name, def, err));
+        if (is_own(job, i))
+            GBT_TRY(render_one(job, &path->shots[i], out, name, def, err));
         log_count("render", i + 1, path->count, (double)NAN);
     }
     return GBT_OK;
@@ -242,18 +242,18 @@ static void collect_frame(const image *own, size_t from, image *out)
 
 /* The first process writes the film, in order. In each round every process draws one frame, or all draw one
    together. `picture`: space for one frame. */
-static gbt_status film_rounds(studio *st, const camera_path *path, video *film, image *picture,
+static gbt_status film_rounds(render_job *job, const camera_path *path, video *film, image *picture,
                               const gbt_render_def *def, gbt_error *err)
 {
-    const size_t size = st->together ? 1 : (size_t)gbt_cluster_size();
-    const size_t rank = st->together ? 0 : (size_t)gbt_cluster_rank();
+    const size_t size = job->together ? 1 : (size_t)gbt_cluster_size();
+    const size_t rank = job->together ? 0 : (size_t)gbt_cluster_rank();
     log_count("render", 0, path->count, (double)NAN);
     for (size_t first = 0; first < path->count; first += size) {
         const size_t count = path->count - first < size ? path->count - first : size;
-        gbt_status status = rank < count ? draw(st, &path->shots[first + rank], def, err) : GBT_OK;
+        gbt_status status = rank < count ? draw(job, &path->shots[first + rank], def, err) : GBT_OK;
         GBT_TRY(cluster_agree(status, err));
         for (size_t i = 0; i < count; i++) {
-            collect_frame(&st->run.frame.rgb, i, picture);
+            collect_frame(&job->run.frame.rgb, i, picture);
             if (film != NULL && status == GBT_OK)
                 status = video_add(film, picture, err);
         }
@@ -263,8 +263,8 @@ static gbt_status film_rounds(studio *st, const camera_path *path, video *film, 
     return GBT_OK;
 }
 
-static gbt_status make_film(studio *st, const camera_path *path, const char *out, const gbt_render_def *def,
-                            gbt_error *err)
+static gbt_status make_film(render_job *job, const camera_path *path, const char *out,
+                            const gbt_render_def *def, gbt_error *err)
 {
     const gbt_camera *camera = &path->shots[0].camera;
     video *film = NULL;
@@ -277,20 +277,20 @@ static gbt_status make_film(studio *st, const camera_path *path, const char *out
     }
     status = cluster_follow(status, err);
     if (status == GBT_OK)
-        status = film_rounds(st, path, film, &picture, def, err);
+        status = film_rounds(job, path, film, &picture, def, err);
     image_free(&picture);
     const gbt_status closed = video_close(film, status == GBT_OK, err);
     return status == GBT_OK ? cluster_follow(closed, err) : status;
 }
 
-static gbt_status render_film(studio *st, const char *out, const gbt_render_def *def, gbt_error *err)
+static gbt_status render_film(render_job *job, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     camera_path path;
-    gbt_status status = cluster_agree(render_path_make(&st->run, def, &path, err), err);
-    deal_out(st, path.count);
+    gbt_status status = cluster_agree(render_path_make(&job->run, def, &path, err), err);
+    deal_out(job, path.count);
     if (status == GBT_OK)
-        status = video_named(out) ? make_film(st, &path, out, def, err)
-                                  : cluster_agree(render_frames(st, &path, out, def, err), err);
+        status = video_named(out) ? make_film(job, &path, out, def, err)
+                                  : cluster_agree(render_frames(job, &path, out, def, err), err);
     if (status == GBT_OK && !video_named(out) && cluster_leads())
         warn_of_older_frames(path.count, out, def);
     if (status == GBT_OK)
@@ -303,17 +303,17 @@ static gbt_status render_film(studio *st, const char *out, const gbt_render_def 
 static const char insert_is_traced[] = "insert: meshes are traced (wanted the renderer trace)";
 
 /* Choose the renderer for the open model, and check that it can do what was asked for. */
-static gbt_status choose_renderer(studio *st, const gbt_render_def *def, gbt_error *err)
+static gbt_status choose_renderer(render_job *job, const gbt_render_def *def, gbt_error *err)
 {
-    gbt_renderer *renderer = &st->run.frame.draw.renderer;
-    st->in_double = def->renderer == GBT_RENDERER_REFERENCE;
-    if (st->in_double)
+    gbt_renderer *renderer = &job->run.frame.draw.renderer;
+    job->in_double = def->renderer == GBT_RENDERER_REFERENCE;
+    if (job->in_double)
         *renderer = GBT_RENDERER_TRACE;
     else if (def->renderer != GBT_RENDERER_AS_TRAINED)
         *renderer = def->renderer;
     if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
-    if (st->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
+    if (job->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "outputs: these are traced (wanted the renderer trace)");
     return GBT_OK;
 }
@@ -439,31 +439,31 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
     PLAIN_NUMBERS;
     GBT_TRY(check_def(out, def, err));
     GBT_TRY(video_named(out) ? file_check_creatable(out, err) : file_check_folder_creatable(out, err));
-    studio *st = mem_calloc(1, sizeof *st, "run", err);
-    if (st == NULL)
+    render_job *job = mem_calloc(1, sizeof *job, "run", err);
+    if (job == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = render_outputs_parse(def->outputs, &st->outputs, err);
+    gbt_status status = render_outputs_parse(def->outputs, &job->outputs, err);
     if (status == GBT_OK)
-        status = open_run(run, out, def, &st->run, err);
+        status = open_run(run, out, def, &job->run, err);
     if (status == GBT_OK)
-        status = check_scored(&st->run, out, def, err);
+        status = check_scored(&job->run, out, def, err);
     if (status == GBT_OK)
-        status = loaded_run_preset(def->preset, &st->run.settings, err);
+        status = loaded_run_preset(def->preset, &job->run.settings, err);
     if (status == GBT_OK)
-        status = choose_renderer(st, def, err);
+        status = choose_renderer(job, def, err);
     if (status == GBT_OK && def->insert != NULL)
-        status = insert_file_read(def->insert, st->run.model.origin, &st->insert, err);
+        status = insert_file_read(def->insert, job->run.model.origin, &job->insert, err);
     if (status == GBT_OK && !video_named(out)) /* only now is it known that there is something to draw */
         status = file_make_folder(out, err);
     status = cluster_agree(status, err);
     if (status == GBT_OK)
-        status = def->path != NULL     ? render_film(st, out, def, err)
-                 : def->camera != NULL ? render_camera(st, out, def, err)
-                                       : render_views(st, out, def, err);
+        status = def->path != NULL     ? render_film(job, out, def, err)
+                 : def->camera != NULL ? render_camera(job, out, def, err)
+                                       : render_views(job, out, def, err);
     if (status == GBT_OK)
-        status = check_memory(st, def, err);
-    insert_scene_free(&st->insert);
-    loaded_run_close(&st->run);
-    mem_free(st);
+        status = check_memory(job, def, err);
+    insert_scene_free(&job->insert);
+    loaded_run_close(&job->run);
+    mem_free(job);
     return status;
 }

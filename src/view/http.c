@@ -36,7 +36,7 @@ static bool has_token(struct MHD_Connection *connection, const guard *g)
    trustworthy addresses, which a plain http address is only on the same machine, and Origin only with some
    requests. Where both are missing the cookie protects: pages of other sites cannot make the browser send it.
    */
-static bool is_another_sites(struct MHD_Connection *connection, const char *path, const char *host)
+static bool is_cross_site(struct MHD_Connection *connection, const char *path, const char *host)
 {
     const char *site = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, "Sec-Fetch-Site");
     const char *origin = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_ORIGIN);
@@ -61,7 +61,7 @@ int http_refusal(struct MHD_Connection *connection, const guard *g, const char *
         *why = "error: no token, or not this server's: open the address that gbtrace view printed\n";
         return 403;
     }
-    if (is_another_sites(connection, path, host)) {
+    if (is_cross_site(connection, path, host)) {
         *why = "error: another site's page may not ask\n";
         return 403;
     }

@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 #include "render/render_outputs.h"
-#include "view/studio.h"
+#include "view/viewer.h"
 
 /* A camera of one pixel that looks along the ray of `camera` through `pixel`, with the same pixel size. False
    if the lens has no ray there. */
@@ -35,24 +35,24 @@ static bool aim(const gbt_camera *camera, const double pixel[2], gbt_camera *out
 
 /* The median depth along the ray of a one-pixel camera, where its transmittance falls below one half; 0 if it
    does not. */
-static gbt_status find_depth(studio *s, const gbt_camera *one, int view, double *depth, gbt_error *err)
+static gbt_status find_depth(viewer_state *s, const gbt_camera *one, int view, double *depth, gbt_error *err)
 {
     const ray_shot shot = ray_shot_of(one);
     const request plain = {.renderer = GBT_RENDERER_TRACE, .preset = GBT_PRESET_DEFAULT, .view = view};
     render_output_images images = {0};
-    GBT_TRY(studio_prepare(s, one, &plain, false, err));
+    GBT_TRY(viewer_prepare(s, one, &plain, false, err));
     const gbt_status status = render_outputs_trace(s->run, &shot, 1u << OUTPUT_MEDIAN_DEPTH, &images, err);
     *depth = status == GBT_OK ? (double)images.of[OUTPUT_MEDIAN_DEPTH].pixels[0] : 0;
     render_output_images_free(&images);
     return status;
 }
 
-gbt_status studio_pick(studio *s, const request *what, answer *out, gbt_error *err)
+gbt_status viewer_pick(viewer_state *s, const request *what, answer *out, gbt_error *err)
 {
     gbt_camera camera, one;
     double depth = 0;
     char text[256];
-    GBT_TRY(studio_camera(s, what, &camera, err));
+    GBT_TRY(viewer_camera(s, what, &camera, err));
     if (!(what->pixel[0] < camera.width && what->pixel[1] < camera.height))
         return base_fail(err, GBT_ERR_ARGUMENT, "x, y: %g, %g (the picture has %d x %d pixels)",
                          what->pixel[0], what->pixel[1], camera.width, camera.height);

@@ -10,7 +10,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "render/render_outputs.h"
-#include "view/studio.h"
+#include "view/viewer.h"
 
 /* In milliseconds. */
 typedef struct picture_times {
@@ -81,7 +81,7 @@ static gbt_status encode(const image *im, const request *what, answer *out, gbt_
     return image_encode(im, quality, &out->bytes, &out->count, err);
 }
 
-static gbt_status finish(const studio *s, const image *im, const request *what, picture_times *times,
+static gbt_status finish(const viewer_state *s, const image *im, const request *what, picture_times *times,
                          answer *out, gbt_error *err)
 {
     const double begin = clock_wall();
@@ -126,16 +126,16 @@ static unsigned output_index(unsigned bit)
     return i;
 }
 
-gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error *err)
+gbt_status viewer_render(viewer_state *s, const request *what, answer *out, gbt_error *err)
 {
     frame *f = &s->run->frame;
     gbt_camera camera, shifted;
-    GBT_TRY(studio_camera(s, what, &camera, err));
+    GBT_TRY(viewer_camera(s, what, &camera, err));
     shifted = sample_camera(&camera, what->sample);
     const bool traced = what->renderer == GBT_RENDERER_TRACE,
                whole = !traced || (what->output == 0 && what->sample == 0);
     const double begin = clock_wall();
-    GBT_TRY(studio_prepare(s, traced ? &camera : &shifted, what, whole, err));
+    GBT_TRY(viewer_prepare(s, traced ? &camera : &shifted, what, whole, err));
     const double prepared = clock_wall(), before = 1000 * (prepared - begin);
     if (whole) {
         picture_times times = {.trace = fmin(1000 * f->times.trace.wall, before)}; /* 0 if it had been drawn
@@ -155,7 +155,7 @@ gbt_status studio_render(studio *s, const request *what, answer *out, gbt_error 
 }
 
 /* Which pixels of a photo count when it is scored. The result is kept in `f`. */
-static gbt_status find_marks(const studio *s, size_t view, const unsigned char *valid, frame *f,
+static gbt_status find_marks(const viewer_state *s, size_t view, const unsigned char *valid, frame *f,
                              const unsigned char **marks, gbt_error *err)
 {
     const gbt_camera camera = photos_camera(&s->run->photos, view, 0);
@@ -164,14 +164,14 @@ static gbt_status find_marks(const studio *s, size_t view, const unsigned char *
     return frame_valid(f, valid, marks, err);
 }
 
-gbt_status studio_photo(studio *s, const request *what, answer *out, gbt_error *err)
+gbt_status viewer_photo(viewer_state *s, const request *what, answer *out, gbt_error *err)
 {
     gbt_camera camera;
     picture_times times = {0};
     image photo = {0};
     frame lens = {0}; /* only its rays are used */
     const unsigned char *valid, *marks = NULL;
-    GBT_TRY(studio_camera(s, what, &camera, err)); /* fails if there is no such view */
+    GBT_TRY(viewer_camera(s, what, &camera, err)); /* fails if there is no such view */
     gbt_status status = photos_get(&s->run->photos, (size_t)what->view, 0, &photo, &valid, err);
     if (status == GBT_OK && what->format == REQUEST_RAW)
         status = find_marks(s, (size_t)what->view, valid, &lens, &marks, err);

@@ -10,7 +10,7 @@
 #include "base/memory.h"
 #include "base/vec.h"
 #include "data/json_out.h"
-#include "view/studio.h"
+#include "view/viewer.h"
 
 enum { SORTED_MAX = 100000 }; /* positions used to find the extent; of more, an even sample */
 
@@ -95,7 +95,7 @@ static gbt_status find_extent(const loaded_run *r, extent *out, gbt_error *err)
     return GBT_OK;
 }
 
-gbt_status studio_scene(const studio *s, answer *out, gbt_error *err)
+gbt_status viewer_scene(const viewer_state *s, answer *out, gbt_error *err)
 {
     const loaded_run *r = s->run;
     extent e;

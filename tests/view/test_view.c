@@ -15,7 +15,7 @@
 #include "gbtrace/evaluate.h"
 #include "gbtrace/export.h"
 #include "gbtrace/view.h"
-#include "view/studio.h"
+#include "view/viewer.h"
 
 /* ---- the viewer in a thread of its own ---- */
 
@@ -229,20 +229,20 @@ static void a_picture_that_nobody_waits_for_is_given_up(void **state)
 {
     (void)state;
     static const gbt_renderer renderers[] = {GBT_RENDERER_TRACE, GBT_RENDERER_RASTER};
-    studio s;
+    viewer_state s;
     atomic_bool stop;
     gbt_render_def def = gbt_render_def_default();
-    assert_ok(studio_open(run_folder, NULL, &s, &assert_ok_err_));
+    assert_ok(viewer_open(run_folder, NULL, &s, &assert_ok_err_));
     s.stop = &stop;
     for (size_t i = 0; i < sizeof renderers / sizeof *renderers; i++) {
         const request what = {.kind = REQUEST_RENDER, .renderer = renderers[i], .preset = GBT_PRESET_DEFAULT};
         answer none = {0}, whole = {0};
         atomic_store(&stop, true);
-        studio_answer(&s, &what, &none);
+        viewer_answer(&s, &what, &none);
         assert_int_equal(none.code, 500);
         assert_non_null(memmem(none.bytes, none.count, "stopped", 7));
         atomic_store(&stop, false);
-        studio_answer(&s, &what, &whole);
+        viewer_answer(&s, &what, &whole);
         assert_int_equal(whole.code, 200);
         def.renderer = renderers[i];
         assert_ok(gbt_render(run_folder, in_folder("whole"), &def, &assert_ok_err_));
@@ -251,7 +251,7 @@ static void a_picture_that_nobody_waits_for_is_given_up(void **state)
         mem_free(none.bytes);
         mem_free(whole.bytes);
     }
-    studio_close(&s);
+    viewer_close(&s);
 }
 
 static void samples_are_other_points_of_the_pixels(void **state)

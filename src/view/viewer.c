@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/studio.c -- open the run, follow its training, prepare views. Pictures are made in picture.c. */
-#include "view/studio.h"
+/* view/viewer.c -- open the run, follow its training, prepare views. Pictures are made in picture.c. */
+#include "view/viewer.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -22,7 +22,7 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
 }
 
 /* Open the run with its photos if they can be found; otherwise `note` says why not. */
-static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_size, gbt_error *err)
+static gbt_status open_run(viewer_state *s, loaded_run *run, char *note, size_t note_size, gbt_error *err)
 {
     gbt_error first = {0};
     const gbt_status status = loaded_run_open(s->input, s->data, 0, run, &first);
@@ -40,7 +40,7 @@ static gbt_status open_run(studio *s, loaded_run *run, char *note, size_t note_s
     return GBT_OK;
 }
 
-static gbt_status reopen(studio *s, const struct stat *file, gbt_error *err)
+static gbt_status reopen(viewer_state *s, const struct stat *file, gbt_error *err)
 {
     char note[sizeof s->note];
     loaded_run *fresh = mem_calloc(1, sizeof *fresh, "run", err);
@@ -72,12 +72,12 @@ static int64_t microseconds_now(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-gbt_status studio_open(const char *input, const char *data, studio *out, gbt_error *err)
+gbt_status viewer_open(const char *input, const char *data, viewer_state *out, gbt_error *err)
 {
     struct stat file;
     bool exists;
     char config[4096];
-    *out = (studio){.input = input, .data = data, .started = microseconds_now()};
+    *out = (viewer_state){.input = input, .data = data, .started = microseconds_now()};
     const bool folder = file_is_folder(input);
     if (folder) {
         GBT_TRY(file_join(out->model_path, sizeof out->model_path, input, "model.gbt", err));
@@ -107,7 +107,7 @@ gbt_status studio_open(const char *input, const char *data, studio *out, gbt_err
     return GBT_OK;
 }
 
-void studio_close(studio *s)
+void viewer_close(viewer_state *s)
 {
     if (s->run != NULL)
         loaded_run_close(s->run);
@@ -115,7 +115,7 @@ void studio_close(studio *s)
     s->run = NULL;
 }
 
-bool studio_follow(studio *s)
+bool viewer_follow(viewer_state *s)
 {
     struct stat file;
     gbt_error err = {0};
@@ -129,7 +129,7 @@ bool studio_follow(studio *s)
     return false;
 }
 
-char *studio_status(const studio *s)
+char *viewer_status(const viewer_state *s)
 {
     struct stat log;
     const bool has_log = s->log_path[0] != '\0' && stat(s->log_path, &log) == 0;
@@ -154,7 +154,7 @@ char *studio_status(const studio *s)
     return out;
 }
 
-gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, gbt_error *err)
+gbt_status viewer_camera(const viewer_state *s, const request *what, gbt_camera *out, gbt_error *err)
 {
     const loaded_run *r = s->run;
     if (what->view < 0) {
@@ -171,10 +171,11 @@ gbt_status studio_camera(const studio *s, const request *what, gbt_camera *out, 
     return what->kind == REQUEST_PHOTO ? GBT_OK : request_check_size(out->width, out->height, err);
 }
 
-gbt_status studio_prepare(studio *s, const gbt_camera *camera, const request *what, bool draw, gbt_error *err)
+gbt_status viewer_prepare(viewer_state *s, const gbt_camera *camera, const request *what, bool draw,
+                          gbt_error *err)
 {
     loaded_run *r = s->run;
-    studio_picture wanted;
+    viewer_picture wanted;
     memset(&wanted, 0, sizeof wanted);
     wanted.camera = *camera;
     wanted.renderer = what->renderer;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* view/studio_answer.c -- dispatch requests to the parts of the studio. */
-#include "view/studio.h"
+/* view/viewer_answer.c -- dispatch requests to the parts of the viewer. */
+#include "view/viewer.h"
 
-void studio_answer(studio *s, const request *what, answer *out)
+void viewer_answer(viewer_state *s, const request *what, answer *out)
 {
     gbt_error err = {0};
     gbt_status status;
@@ -12,13 +12,13 @@ void studio_answer(studio *s, const request *what, answer *out)
     }
     s->run->frame.scene.stop = s->run->frame.splats.stop = s->stop;
     if (what->kind == REQUEST_SCENE)
-        status = studio_scene(s, out, &err);
+        status = viewer_scene(s, out, &err);
     else if (what->kind == REQUEST_PICK)
-        status = studio_pick(s, what, out, &err);
+        status = viewer_pick(s, what, out, &err);
     else if (what->kind == REQUEST_PHOTO)
-        status = studio_photo(s, what, out, &err);
+        status = viewer_photo(s, what, out, &err);
     else
-        status = studio_render(s, what, out, &err);
+        status = viewer_render(s, what, out, &err);
     if (status != GBT_OK)
         answer_failure(out, status, &err);
 }

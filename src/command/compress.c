@@ -36,7 +36,7 @@ typedef struct compression {
 } compression;
 
 /* Whether the settings of RUN ask for a lossless model. */
-static gbt_status find_wish(const char *run, bool *lossless, gbt_error *err)
+static gbt_status wants_lossless(const char *run, bool *lossless, gbt_error *err)
 {
     char path[4096];
     unsigned char *text = NULL;
@@ -102,7 +102,7 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
     }
     if (!c->lossless) {
         if (status == GBT_OK)
-            status = model_turn_features(&r->model, &s, err);
+            status = model_transform_features(&r->model, &s, err);
         if (status == GBT_OK)
             status = model_steps_at(&r->model, &s, def->quality, &steps, err);
     }
@@ -242,7 +242,7 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
     char path[4096];
     bool has_views = false, stays = false;
     if (def->unless_lossless)
-        GBT_TRY(find_wish(run, &stays, err));
+        GBT_TRY(wants_lossless(run, &stays, err));
     if (stays)
         return GBT_OK;
     GBT_TRY(find_model(run, path, sizeof path, err));

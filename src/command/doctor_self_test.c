@@ -28,7 +28,7 @@ enum {
    apply the same limits to random scenes. */
 static const double picture_limit = 1e-4, gradient_limit = 5e-5;
 
-typedef struct patient {
+typedef struct self_test {
     gaussians g, d_gaussians;
     trace_scene scene;
     trace_settings settings;
@@ -36,7 +36,7 @@ typedef struct patient {
     image rgb, d_rgb;
     bool *in_band;
     double *wanted, *d_wanted, *d_exact; /* [rays][3], [fields][count], [rays][3] */
-} patient;
+} self_test;
 
 /* Flat and round Gaussians in the unit ball, the same on every machine. */
 static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error *err)
@@ -70,7 +70,7 @@ static gbt_status make_cloud(gaussians *g, size_t count, double size, gbt_error 
     return GBT_OK;
 }
 
-static gbt_status set_up(patient *p, size_t count, double size, int width, int height, gbt_error *err)
+static gbt_status set_up(self_test *p, size_t count, double size, int width, int height, gbt_error *err)
 {
     const gbt_camera camera = {.model = GBT_CAMERA_SIMPLE_PINHOLE,
                                .width = width,
@@ -85,7 +85,7 @@ static gbt_status set_up(patient *p, size_t count, double size, int width, int h
     return trace_build(&p->scene, &p->g, &p->settings, ray_image_reach(&p->rays), err);
 }
 
-static gbt_status find_band(patient *p, const reference_scene *exact, size_t *left_out, gbt_error *err)
+static gbt_status find_band(self_test *p, const reference_scene *exact, size_t *left_out, gbt_error *err)
 {
     band_scratch scratch = {0};
     gbt_status status = GBT_OK;
@@ -114,7 +114,8 @@ void doctor_compare(gbt_diagnosis *d, const char *name, const char *what, double
     }
 }
 
-static gbt_status compare_pictures(patient *p, const reference_scene *exact, gbt_diagnosis *d, gbt_error *err)
+static gbt_status compare_pictures(self_test *p, const reference_scene *exact, gbt_diagnosis *d,
+                                   gbt_error *err)
 {
     const trace_outputs out = {.rgb = &p->rgb};
     const size_t rays = ray_image_count(&p->rays);
@@ -132,7 +133,7 @@ static gbt_status compare_pictures(patient *p, const reference_scene *exact, gbt
     return GBT_OK;
 }
 
-static gbt_status compare_gradients(patient *p, const reference_scene *exact, gbt_diagnosis *d,
+static gbt_status compare_gradients(self_test *p, const reference_scene *exact, gbt_diagnosis *d,
                                     gbt_error *err)
 {
     const size_t rays = ray_image_count(&p->rays);
@@ -161,7 +162,7 @@ static gbt_status compare_gradients(patient *p, const reference_scene *exact, gb
     return GBT_OK;
 }
 
-static gbt_status check_exactness(patient *p, gbt_diagnosis *d, gbt_error *err)
+static gbt_status check_exactness(self_test *p, gbt_diagnosis *d, gbt_error *err)
 {
     GBT_TRY(set_up(p, SMALL, 0.06, SMALL_WIDTH, SMALL_HEIGHT, err));
     const size_t rays = ray_image_count(&p->rays);
@@ -182,7 +183,7 @@ static gbt_status check_exactness(patient *p, gbt_diagnosis *d, gbt_error *err)
     return status;
 }
 
-static gbt_status measure_speed(patient *p, gbt_diagnosis *d, gbt_error *err)
+static gbt_status measure_speed(self_test *p, gbt_diagnosis *d, gbt_error *err)
 {
     const trace_outputs out = {.rgb = &p->rgb};
     double best = (double)INFINITY;
@@ -200,7 +201,7 @@ static gbt_status measure_speed(patient *p, gbt_diagnosis *d, gbt_error *err)
 
 gbt_status doctor_self_test(gbt_diagnosis *d, gbt_error *err)
 {
-    patient p = {0};
+    self_test p = {0};
     gbt_status status = check_exactness(&p, d, err);
     if (status == GBT_OK)
         status = measure_speed(&p, d, err);

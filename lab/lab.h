@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* lab/lab.h -- what measures and does not make: benchmarks, studies, stability, the gradient check. For the
    program; not installed. */
-#ifndef LAB_LAB_H
-#define LAB_LAB_H
+#ifndef GBT_LAB_H
+#define GBT_LAB_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_passes.h -- time several ways to render the same Gaussians and rays, traced or splatted,
    taking turns. */
-#ifndef LAB_BENCHMARK_BENCH_PASSES_H
-#define LAB_BENCHMARK_BENCH_PASSES_H
+#ifndef GBT_BENCHMARK_BENCH_PASSES_H
+#define GBT_BENCHMARK_BENCH_PASSES_H
 
 #include "base/cpu.h"
 #include "raster/raster.h"

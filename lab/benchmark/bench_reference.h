@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_reference.h -- render some pixels in double precision, and measure the error of other
    pictures against them. */
-#ifndef LAB_BENCHMARK_BENCH_REFERENCE_H
-#define LAB_BENCHMARK_BENCH_REFERENCE_H
+#ifndef GBT_BENCHMARK_BENCH_REFERENCE_H
+#define GBT_BENCHMARK_BENCH_REFERENCE_H
 
 #include "base/gaussians.h"
 #include "base/image.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/bench_scene.h -- the input of benchmarks and studies: Gaussians, plain or decoded from a run, and
    the rays of one camera. */
-#ifndef LAB_BENCHMARK_BENCH_SCENE_H
-#define LAB_BENCHMARK_BENCH_SCENE_H
+#ifndef GBT_BENCHMARK_BENCH_SCENE_H
+#define GBT_BENCHMARK_BENCH_SCENE_H
 
 #include "render/camera_file.h"
 #include "run/loaded_run.h"

@@ -16,7 +16,7 @@ void stability_crowd(stability *s, gaussians *g)
     const size_t more = (size_t)stability_number(s, "more_gaussians");
     const uint64_t seed = (uint64_t)stability_number(s, "seed");
     stability_gaussians(s, &two);
-    draw_some(s, g, two.count + more);
+    draw_alloc(s, g, two.count + more);
     for (size_t i = 0; i < g->count && s->status == GBT_OK; i++) {
         double mean[3], scale[3], quat[4], color[3];
         draw_random_turn(seed, 20, i, quat);

@@ -117,7 +117,7 @@ void draw_ray(ray_image *rays, size_t i, const double origin[3], const double di
 
 /* ---- Gaussians ---- */
 
-void draw_some(stability *s, gaussians *g, size_t count)
+void draw_alloc(stability *s, gaussians *g, size_t count)
 {
     static const double zero[3] = {0, 0, 0}, one[3] = {1, 1, 1}, grey[3] = {0.5, 0.5, 0.5};
     if (s->status != GBT_OK || !stability_ok(s, gaussians_resize(g, count, s->err)))

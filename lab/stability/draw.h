@@ -44,7 +44,7 @@ void draw_rays(stability *s, ray_image *rays, int width, int height);
 void draw_ray(ray_image *rays, size_t i, const double origin[3], const double dir[3]);
 
 /** Allocate `count` Gaussians with padding: grey, round, size 1, opacity 1, at the origin. */
-void draw_some(stability *s, gaussians *g, size_t count);
+void draw_alloc(stability *s, gaussians *g, size_t count);
 
 /** Set Gaussian i. quat NULL: no rotation. */
 void draw_set(gaussians *g, size_t i, const double mean[3], const double scale[3], const double quat[4],

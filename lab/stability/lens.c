@@ -26,7 +26,7 @@ static trace_settings without_edges(const stability *s)
 
 static void all_around(stability *s, size_t count, gaussians *g)
 {
-    draw_some(s, g, count);
+    draw_alloc(s, g, count);
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         double mean[3], scale[3], color[3], quat[4];
         draw_random_turn(10, 0, i, quat);
@@ -117,7 +117,7 @@ static void off_axis(stability *s, double distance, double angle, drawing *ours,
     gaussians g = {0};
     ray_image rays = {0};
     camera.params[2] = 0.5 * WIDTH - focal * tan(angle);
-    draw_some(s, &g, 1);
+    draw_alloc(s, &g, 1);
     if (s->status == GBT_OK)
         draw_set(&g, 0, mean, scale, NULL, 0.99, white);
     draw_camera(s, ours, &g, &settings, &camera, &rays);

@@ -45,7 +45,7 @@ static void stack_up(stability *s, size_t n, double alpha, double depth, gaussia
 {
     static const double one[3] = {1, 1, 1}, colors[2][3] = {{1, 0, 0}, {0, 0, 1}};
     const double mean[3] = {0, 0, depth};
-    draw_some(s, g, n);
+    draw_alloc(s, g, n);
     for (size_t i = 0; i < n && s->status == GBT_OK; i++)
         draw_set(g, i, mean, one, NULL, alpha, colors[2 * i < n ? 0 : 1]);
 }
@@ -190,7 +190,7 @@ gbt_status stability_a4(stability *s)
 static void concentric(stability *s, size_t count, double opacity, gaussians *g)
 {
     const double size = stability_number(s, "scale"), scale[3] = {size, size, size};
-    draw_some(s, g, count);
+    draw_alloc(s, g, count);
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         const double share = (double)i / (double)count;
         const double mean[3] = {0, 0, 4 + 2 * (double)rng_uniform(6, 0, i)},

@@ -62,7 +62,7 @@ practice *practice_make(stability *s, size_t gaussian_count, size_t view_count, 
         stability_ok(s, GBT_ERR_NO_MEMORY);
         return NULL;
     }
-    draw_some(s, &p->truth, gaussian_count);
+    draw_alloc(s, &p->truth, gaussian_count);
     for (size_t i = 0; i < gaussian_count && s->status == GBT_OK; i++)
         put_gaussian(p, i, gaussian_count);
     p->point_count = gaussian_count;

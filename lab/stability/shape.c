@@ -118,7 +118,7 @@ static void build_needles(stability *s, double r)
     const trace_settings settings = trace_settings_default();
     gaussians g = {0};
     trace_scene traced = {.kernel = TRACE_TREE};
-    draw_some(s, &g, 10000);
+    draw_alloc(s, &g, 10000);
     for (size_t i = 0; i < g.count && s->status == GBT_OK; i++) {
         const double scale[3] = {1, 1 / r, 1 / r}, white[3] = {1, 1, 1};
         double mean[3], quat[4];
@@ -143,7 +143,7 @@ gbt_status stability_a2(stability *s)
     needles *n = mem_calloc(1, sizeof *n, "needles", s->err);
     if (n == NULL || count < 1)
         return n == NULL ? GBT_ERR_NO_MEMORY : GBT_ERR_FORMAT;
-    draw_some(s, &n->g, 1);
+    draw_alloc(s, &n->g, 1);
     draw_rays(s, &n->rays, 1, 1);
     stability_chart *chart = stability_new_chart(
         s, "Needles", "Error of alpha, of 95 in 100 needles. Loaded files are clamped at a ratio of 10,000.",
@@ -322,7 +322,7 @@ static void furnish(stability *s, far_scene *f)
 {
     const size_t count = (size_t)stability_number(s, "gaussians");
     const double half = stability_number(s, "half_size"), size = stability_number(s, "scale");
-    draw_some(s, &f->local, count);
+    draw_alloc(s, &f->local, count);
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         double mean[3], scale[3], color[3], quat[4];
         draw_random_turn(5, 9, i, quat);
@@ -388,7 +388,7 @@ gbt_status stability_a5(stability *s)
     const trace_settings settings = trace_settings_default();
     far_scene f = {.camera = draw_pinhole(size, size, size, behind)};
     furnish(s, &f);
-    draw_some(s, &f.moved, f.local.count);
+    draw_alloc(s, &f.moved, f.local.count);
     if (s->status == GBT_OK && stability_ok(s, ray_image_from_camera(&f.camera, &f.rays, s->err)))
         f.exact = draw_exact(s, &f.local, &settings, &f.rays, NULL);
     stability_chart *chart = stability_new_chart(

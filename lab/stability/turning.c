@@ -186,13 +186,14 @@ static size_t find_still(stability *s, const gaussians *g, double pixel, bool st
 }
 
 /* One renderer's colours in fixed directions while its camera turns. */
-typedef struct onlooker {
+typedef struct fixed_directions {
     drawing d;
     double last[LOOK_COUNT][3], jump;
     bool has_last;
-} onlooker;
+} fixed_directions;
 
-static void look_around(onlooker *o, const gbt_camera *camera, const bool still[LOOK_COUNT], double aside[3])
+static void look_around(fixed_directions *o, const gbt_camera *camera, const bool still[LOOK_COUNT],
+                        double aside[3])
 {
     for (int i = 0; i < LOOK_COUNT; i++) {
         double dir[3], now[3] = {0, 0, 0};
@@ -249,7 +250,7 @@ static void turn_slowly(stability *s)
                                      stability_number(s, "focal"), here);
     gaussians g = {0};
     ray_image rays = {0};
-    onlooker *ours = mem_calloc(2, sizeof *ours, "directions", s->err), *theirs = ours + 1;
+    fixed_directions *ours = mem_calloc(2, sizeof *ours, "directions", s->err), *theirs = ours + 1;
     stability_gaussians(s, &g);
     if (ours == NULL || !stability_ok(s, s->status)) {
         stability_ok(s, GBT_ERR_NO_MEMORY);

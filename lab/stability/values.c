@@ -14,7 +14,7 @@
 static void in_a_row(stability *s, size_t n, double opacity, gaussians *g)
 {
     const double scale[3] = {0.2, 0.2, 0.2};
-    draw_some(s, g, n);
+    draw_alloc(s, g, n);
     for (size_t i = 0; i < n && s->status == GBT_OK; i++) {
         const double mean[3] = {0, 0, 2 + 0.5 * (double)i}, grey = i == 0 ? 1 : 0.2,
                      color[3] = {grey, grey, grey};
@@ -97,7 +97,7 @@ enum { BAD_VALUES = sizeof bad_values / sizeof *bad_values, BAD_SIZE = 24 };
 
 static void scatter(stability *s, size_t count, gaussians *g)
 {
-    draw_some(s, g, count);
+    draw_alloc(s, g, count);
     for (size_t i = 0; i < count && s->status == GBT_OK; i++) {
         double mean[3], scale[3], color[3], quat[4];
         draw_random_turn(8, 9, i, quat);

@@ -29,7 +29,7 @@ static void lay_grid(stability *s, double spacing, gaussians *g)
     const size_t across = (size_t)stability_number(s, "across");
     const double size = stability_number(s, "scale"), scale[3] = {size, size, size},
                  opacity = stability_number(s, "opacity");
-    draw_some(s, g, across * across);
+    draw_alloc(s, g, across * across);
     for (size_t i = 0; s->status == GBT_OK && i < g->count; i++) {
         const double mean[3] = {spacing * ((double)(i % across) - (double)(across / 2)),
                                 spacing * ((double)(i / across) - (double)(across / 2)), 0};

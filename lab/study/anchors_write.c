@@ -39,8 +39,8 @@ static stat_sample stat_over(const grid_study *s, size_t scene, size_t variant, 
 
 /* A variant compared with `base` at the same seed: the difference, or the percentage of the value of `base`.
  */
-static stat_sample change_over(const grid_study *s, size_t scene, size_t variant, size_t base, figure which,
-                               bool relative)
+static stat_sample compared_with(const grid_study *s, size_t scene, size_t variant, size_t base, figure which,
+                                 bool relative)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {
@@ -69,9 +69,9 @@ static void add_row(const grid_study *s, size_t scene, size_t v, text *out)
         stat_add(out, &stat, figure_texts[f].decimals, false);
         text_add(out, " |");
     }
-    const stat_sample initial = change_over(s, scene, v, ANCHORS_BALLS, INITIAL, true),
-                      final = change_over(s, scene, v, ANCHORS_VOXELS, FINAL, true);
-    const stat_sample psnr = change_over(s, scene, v, ANCHORS_VOXELS, PSNR, false);
+    const stat_sample initial = compared_with(s, scene, v, ANCHORS_BALLS, INITIAL, true),
+                      final = compared_with(s, scene, v, ANCHORS_VOXELS, FINAL, true);
+    const stat_sample psnr = compared_with(s, scene, v, ANCHORS_VOXELS, PSNR, false);
     text_add(out, " ");
     stat_add(out, &initial, 0, false);
     text_add(out, " | ");
@@ -129,15 +129,15 @@ static void add_rows(const grid_study *s, size_t scene, json_t *rows)
     for (size_t v = 1; v < anchors_variant_count; v++) {
         const char *start = anchors_variants[v].name;
         add_limited(rows, s->grid.names[scene], start, "final anchors, % of the voxels'",
-                    change_over(s, scene, v, ANCHORS_VOXELS, FINAL, true).mean, NAN);
+                    compared_with(s, scene, v, ANCHORS_VOXELS, FINAL, true).mean, NAN);
         add_limited(rows, s->grid.names[scene], start, "blended per ray, % of the voxels'",
-                    change_over(s, scene, v, ANCHORS_VOXELS, BLENDED, true).mean, NAN);
+                    compared_with(s, scene, v, ANCHORS_VOXELS, BLENDED, true).mean, NAN);
         add_limited(rows, s->grid.names[scene], start, "PSNR against the voxels', dB",
-                    change_over(s, scene, v, ANCHORS_VOXELS, PSNR, false).mean, NAN);
+                    compared_with(s, scene, v, ANCHORS_VOXELS, PSNR, false).mean, NAN);
     }
     add_limited(rows, s->grid.names[scene], anchors_variants[ANCHORS_ADAPTIVE].name,
                 "initial anchors, % of the paper's balls",
-                change_over(s, scene, ANCHORS_ADAPTIVE, ANCHORS_BALLS, INITIAL, true).mean, 50);
+                compared_with(s, scene, ANCHORS_ADAPTIVE, ANCHORS_BALLS, INITIAL, true).mean, 50);
 }
 
 static json_t *data_of(const void *study)

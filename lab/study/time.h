@@ -45,7 +45,7 @@ double time_to_reach(const study_figures *run, double psnr);
 
 /** For each seed, the time after which the default variant has the final PSNR of the faithful protocol. NaN
     if it does not reach it for one of the seeds. */
-stat_sample time_saved(const grid_study *s, size_t scene);
+stat_sample time_to_match(const grid_study *s, size_t scene);
 
 /** The files that the study writes. */
 extern const study_output time_output;

@@ -52,7 +52,7 @@ double time_to_reach(const study_figures *run, double psnr)
     return NAN;
 }
 
-stat_sample time_saved(const grid_study *s, size_t scene)
+stat_sample time_to_match(const grid_study *s, size_t scene)
 {
     double values[STUDY_SEEDS_MAX];
     for (int seed = 0; seed < s->grid.seeds; seed++) {

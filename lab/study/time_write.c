@@ -66,7 +66,7 @@ static void add_variants(const grid_study *s, size_t scene, text *out)
 
 static void add_words(const grid_study *s, size_t scene, text *out)
 {
-    const stat_sample reached = time_saved(s, scene), theirs = time_psnr(s, scene, TIME_FAITHFUL);
+    const stat_sample reached = time_to_match(s, scene), theirs = time_psnr(s, scene, TIME_FAITHFUL);
     if (!isfinite(theirs.mean)) {
         text_add(out, "\nThe faithful protocol's end: n/a.\n");
         return;
@@ -123,7 +123,7 @@ static json_t *curve_to_json(const grid_study *s, size_t scene, size_t variant)
 static void add_scene(const grid_study *s, size_t scene, json_t *rows, json_t *runs)
 {
     char row[STUDY_NAME_SIZE + 160];
-    const stat_sample reached = time_saved(s, scene);
+    const stat_sample reached = time_to_match(s, scene);
     snprintf(row, sizeof row,
              "%s: seconds of the default to the PSNR that the faithful protocol has after %g budgets",
              s->grid.names[scene], time_variants[TIME_FAITHFUL].budgets);

@@ -33,8 +33,8 @@ typedef struct growth_def {
     float importance_min;  /* anchors whose mean importance over the views that show them is lower are pruned.
                               Default 0.005, for importance by opacity */
     float interval;        /* I: number of views whose statistics a round uses, default 100. A Gaussian counts
-                              when grad_count > I * GROWTH_VIEW_SHARE * 0.5; an anchor is judged when visit_count
-                              > I * GROWTH_VIEW_SHARE. Statistics that were used are reset to 0 */
+                              when grad_count > I * GROWTH_VIEW_SHARE * 0.5; an anchor is judged when
+                              visit_count > I * GROWTH_VIEW_SHARE. Statistics that were used are reset to 0 */
     float shape_log_max;   /* scale_log[3..5] are clamped to this in every round. Default infinity */
     size_t max_anchors;    /* hard cap on the number of anchors after the round. Pruning makes room first; the
                               cap itself prunes nothing. When it is reached, the cells with the largest

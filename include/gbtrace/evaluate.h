@@ -92,7 +92,7 @@ gbt_status gbt_compare_images(const char *path, const char *reference, const cha
 /**
  * gbt_compare_images() for images in memory, [height][width][3], also rounded to 8 bit; without LPIPS.
  *
- * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels), GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (no pixels, or a value that is not finite), GBT_ERR_NO_MEMORY
  *
  * Threads: any, with distinct `out`.
  */

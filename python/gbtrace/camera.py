@@ -38,6 +38,8 @@ class Camera:
     @classmethod
     def pinhole(cls, width, height, fov_x_deg):
         """At the origin, looking along z."""
+        if not 0 < fov_x_deg < 180:
+            raise ValueError(f"fov_x_deg: {fov_x_deg} (wanted above 0 and below 180)")
         f = 0.5 * width / math.tan(math.radians(0.5 * fov_x_deg))
         return cls("PINHOLE", width, height, (f, f, 0.5 * width, 0.5 * height))
 

@@ -192,6 +192,9 @@ class Cameras(unittest.TestCase):
         for width, height, says in ((2**32 + 4, 4, "width: 4294967300"), (4, -1, r"height: -1 \(wanted 0 to 2147483647\)")):
             with self.assertRaisesRegex(ValueError, says):
                 gbtrace.Camera("PINHOLE", width, height, (1, 1, 1, 1))
+        for angle in (0, -60, 180, np.nan):
+            with self.assertRaisesRegex(ValueError, r"fov_x_deg: .* \(wanted above 0 and below 180\)"):
+                gbtrace.Camera.pinhole(4, 4, angle)
         for width, height, says in ((0, 0, r"width: 0 \(wanted 1 to"), (4, -1, "height: -1"), (2**32 + 4, 4, "width: 4294967300")):
             with self.assertRaisesRegex(ValueError, says):
                 a_camera().resized(width, height)
@@ -406,6 +409,10 @@ class Runs(unittest.TestCase):
         self.assertLess(gbtrace.compare(a, np.float32(1) - a).psnr, 10)
         with self.assertRaisesRegex(ValueError, "reference: shape"):
             gbtrace.compare(a, a[:10])
+        b = a.copy()
+        b[3, 5, 1] = np.nan
+        with self.assertRaisesRegex(ValueError, "reference: nan at pixel 5, 3"):
+            gbtrace.compare(a, b)
 
     def test_settings_of_training_are_checked(self):
         with self.assertRaisesRegex(gbtrace.FormatError, "settings:1"):

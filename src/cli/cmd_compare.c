@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* cli/cmd_compare.c -- gbtrace compare. */
+#include <math.h>
 #include <stdio.h>
 
 #include "cli/options.h"
@@ -44,8 +45,11 @@ static int run(const operands *given)
         }
         print_number("flip", c.flip, "}\n");
     } else {
-        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %.6f), FLIP %.6f", c.width, c.height,
-               c.psnr, c.ssim, c.ssim_interior, c.flip);
+        char inside[32] = "n/a"; /* pictures smaller than a window have none inside */
+        if (!isnan(c.ssim_interior))
+            snprintf(inside, sizeof inside, "%.6f", c.ssim_interior);
+        printf("%d x %d: PSNR %.4f dB, SSIM %.6f (windows inside: %s), FLIP %.6f", c.width, c.height, c.psnr,
+               c.ssim, inside, c.flip);
         if (network != NULL)
             printf(", LPIPS %.6f (colours in [0, 1]: %.6f)", c.lpips, c.lpips_01);
         putchar('\n');

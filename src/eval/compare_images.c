@@ -72,6 +72,18 @@ gbt_status gbt_compare_images(const char *path, const char *reference, const cha
     return status;
 }
 
+/* Rounding would make a number of what is none, and two pictures equal that are not. */
+static gbt_status check_finite(const float *const pictures[2], int width, int height, gbt_error *err)
+{
+    for (int i = 0; i < 2; i++)
+        for (size_t k = 0; k < 3 * (size_t)width * (size_t)height; k++)
+            if (!isfinite(pictures[i][k]))
+                return base_fail(err, GBT_ERR_ARGUMENT, "%s: %g at pixel %zu, %zu (wanted finite values)",
+                                 i == 0 ? "picture" : "reference", (double)pictures[i][k],
+                                 k / 3 % (size_t)width, k / 3 / (size_t)width);
+    return GBT_OK;
+}
+
 gbt_status gbt_compare_pictures(const float *picture, const float *reference, int width, int height,
                                 gbt_comparison *out, gbt_error *err)
 {
@@ -80,6 +92,7 @@ gbt_status gbt_compare_pictures(const float *picture, const float *reference, in
     *out = (gbt_comparison){0};
     if (width < 1 || height < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "pictures: %d x %d pixels (wanted both >= 1)", width, height);
+    GBT_TRY(check_finite(from, width, height, err));
     gbt_status status = GBT_OK;
     for (int i = 0; i < 2 && status == GBT_OK; i++) {
         status = image_alloc(&copies[i], width, height, 3, err);

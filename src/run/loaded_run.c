@@ -353,6 +353,16 @@ void loaded_run_file_name(const char *name, char out[FILE_NAME_SIZE])
         add_hash(name, out);
 }
 
+/* Whether NAME.png may be a file that belongs to OTHER: OTHER.photo.png, OTHER.median-depth.exr. */
+static bool is_beside(const char *name, const char *other)
+{
+    const size_t length = strlen(other);
+    if (strncmp(name, other, length) != 0 || name[length] != '.')
+        return false;
+    const char *word = name + length + 1;
+    return word[strspn(word, "abcdefghijklmnopqrstuvwxyz-")] == '\0';
+}
+
 void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_SIZE])
 {
     const char *name = r->scene.views[view].name;
@@ -362,7 +372,7 @@ void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_S
         if (i == view)
             continue;
         loaded_run_file_name(r->scene.views[i].name, other);
-        if (strcmp(other, out) != 0)
+        if (strcmp(other, out) != 0 && !is_beside(out, other))
             continue;
         add_hash(name, out);
         return;

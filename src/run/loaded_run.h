@@ -98,8 +98,9 @@ enum { FILE_NAME_SIZE = 256 };
 /** "a/b.jpg" becomes "a_b": a file name for a view, at most 200 bytes of UTF-8. */
 void loaded_run_file_name(const char *view_name, char out[FILE_NAME_SIZE]);
 
-/** The same for an open view; if another view would get the same name ("a.png" and "a.jpg"), a hash of the
-    whole name is appended. Cost: compares with all views. */
+/** The same for an open view. If another view has the same name ("a.png" and "a.jpg"), or files of such names
+    beside it ("a.photo.png" and "a.png"), a hash of the whole name is appended. Cost: compares with all views.
+ */
 void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_SIZE]);
 
 #endif

@@ -206,6 +206,8 @@ if command -v perl >/dev/null; then
     perl -e '$n = 5e8; $much = "x" x $n; exec @ARGV' "$program" info made --memory 400M >out 2>err
     report $? "a limit does not count what was there before the program" "$(cat err)"
 fi
+"$program" make-scene tabletop -o low --width 16 --height 8 --views 3 --samples 1 --points 60 --quiet >out 2>&1
+holds "pictures smaller than a window of SSIM" 0 '(windows inside: n/a), FLIP 0.000000$' compare low/images/0000.png low/images/0000.png
 holds "query of a data set" 0 '[0-9]' query nearest made --at 0,0,0 --count 3
 printf '<svg xmlns="http://www.w3.org/2000/svg"/>' >chart.svg && "$program" report run ./chart.svg >out 2>err && grep -q 'class="study card"' run/report.html
 report $? "a chart that is named from here" "$(cat err out)"

@@ -34,6 +34,16 @@ static void figures_are_those_of_the_metrics(void **state)
     assert_ok(gbt_compare_pictures(a.pixels, b.pixels, 24, 20, &in_memory, NULL));
     assert_memory_equal(&in_memory, &c, sizeof c);
     assert_int_equal(gbt_compare_pictures(a.pixels, b.pixels, 0, 20, &in_memory, NULL), GBT_ERR_ARGUMENT);
+    for (int i = 0; i < 2; i++) {
+        gbt_error err = {0};
+        float *value = &(i == 0 ? a : b).pixels[3 * (24 * 7 + 2) + 1], kept = *value;
+        *value = i == 0 ? NAN : INFINITY;
+        assert_int_equal(gbt_compare_pictures(a.pixels, b.pixels, 24, 20, &in_memory, &err),
+                         GBT_ERR_ARGUMENT);
+        assert_string_equal(err.text, i == 0 ? "picture: nan at pixel 2, 7 (wanted finite values)"
+                                             : "reference: inf at pixel 2, 7 (wanted finite values)");
+        *value = kept;
+    }
     assert_ok(gbt_compare_images(in_folder("a.png"), in_folder("a.png"), NULL, &c, NULL));
     assert_true(c.psnr == METRIC_PSNR_MAX && c.ssim == 1 && c.ssim_interior == 1 && c.flip == 0);
     image_free(&a);
@@ -97,6 +107,25 @@ static void alpha_is_left_out(void **state)
     image_free(&without);
 }
 
+static void no_view_gets_files_of_another(void **state)
+{
+    (void)state;
+    const char *const names[] = {"0.png",   "0.photo.png",  "0.median-depth.png", "0.flip.photo.jpg",
+                                 "a/0.jpg", "a_0.hits.png", "1623.png",           "1623.25.png"};
+    enum { COUNT = sizeof names / sizeof *names };
+    scene_view views[COUNT] = {{0}};
+    for (size_t i = 0; i < COUNT; i++)
+        views[i].name = (char *)names[i];
+    const loaded_run r = {.scene = {.views = views, .view_count = COUNT}};
+    static const bool told_apart[COUNT] = {false, true, true, false, false, true, false, false};
+    for (size_t i = 0; i < COUNT; i++) {
+        char plain[FILE_NAME_SIZE], got[FILE_NAME_SIZE];
+        loaded_run_file_name(names[i], plain);
+        loaded_run_view_name(&r, i, got);
+        assert_true((strcmp(plain, got) != 0) == told_apart[i]);
+    }
+}
+
 static void what_cannot_be_compared(void **state)
 {
     (void)state;
@@ -128,6 +157,7 @@ int main(void)
         cmocka_unit_test(figures_are_those_of_the_metrics),
         cmocka_unit_test(pictures_are_named_after_views),
         cmocka_unit_test(alpha_is_left_out),
+        cmocka_unit_test(no_view_gets_files_of_another),
         cmocka_unit_test(what_cannot_be_compared),
     };
     return cmocka_run_group_tests(tests, folder_make, folder_remove);

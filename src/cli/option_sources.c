@@ -83,6 +83,8 @@ int options_read_config(const char *path, const option *options, int option_coun
     const int code = read_config_file(path, &text);
     if (code != GO_ON)
         return code;
+    if (strncmp(text, "\xef\xbb\xbf", 3) == 0)
+        text += 3; /* the byte order mark that some editors write */
     for (int line = 1; text != NULL; line++) {
         char *next = strchr(text, '\n');
         if (next != NULL)

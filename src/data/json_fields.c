@@ -23,7 +23,8 @@ gbt_status json_read(const char *path, json_t **out, gbt_error *err)
 gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err)
 {
     json_error_t where;
-    *out = json_loadb(text, length, JSON_REJECT_DUPLICATES, &where);
+    const size_t mark = file_mark_bytes(text, length);
+    *out = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
     if (*out == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", name, where.line, where.text);
     if (json_is_object(*out))

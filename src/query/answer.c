@@ -63,6 +63,11 @@ static void put(FILE *out, char before, double value)
     fprintf(out, "%c%s", before, text);
 }
 
+static void print_header(const gbt_query_def *def, FILE *out)
+{
+    fprintf(out, "query,rank,ball,%s,x,y,z,radius\n", def->kind == GBT_QUERY_CROSSED ? "t" : "distance");
+}
+
 static void print_answer(FILE *out, const gbt_balls_view *v, size_t query, size_t rank, uint32_t ball,
                          double value)
 {
@@ -79,13 +84,17 @@ static gbt_status nearest(const gbt_balls *balls, const gbt_query_def *def, cons
 {
     const gbt_balls_view v = gbt_balls_get(balls);
     const size_t k = (size_t)def->k < v.count ? (size_t)def->k : v.count;
-    if (k == 0)
+    if (k == 0) {
+        print_header(def, out);
         return GBT_OK;
+    }
     uint32_t *index = mem_alloc(count, k * sizeof *index, "answers", err);
     double *distance = mem_alloc(count, k * sizeof *distance, "answers", err);
     const gbt_status status = index == NULL || distance == NULL
                                   ? GBT_ERR_NO_MEMORY
                                   : gbt_balls_nearest(balls, point, count, k, false, index, distance, err);
+    if (status == GBT_OK)
+        print_header(def, out);
     for (size_t i = 0; i < count * k && status == GBT_OK; i++)
         print_answer(out, &v, i / k, i % k, index[i], distance[i]);
     mem_free(index);
@@ -118,6 +127,8 @@ static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const 
                  : def->kind == GBT_QUERY_WITHIN     ? gbt_balls_within(balls, point, first, n, &a, err)
                  : def->kind == GBT_QUERY_CONTAINING ? gbt_balls_containing(balls, point, n, &a, err)
                                                      : gbt_balls_overlapping(balls, point, first, n, &a, err);
+    if (status == GBT_OK)
+        print_header(def, out);
     for (size_t i = 0; i < n && status == GBT_OK; i++)
         for (size_t at = a.first[i]; at < a.first[i + 1]; at++)
             print_answer(out, &v, i, at - a.first[i], a.index[at], a.value[at]);
@@ -128,18 +139,21 @@ static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const 
     return status;
 }
 
+/* Values that no query can have are bad input here, of this file. */
 static gbt_status answer(const gbt_balls *balls, const gbt_query_def *def, const query_rows *rows, FILE *out,
                          gbt_error *err)
 {
     double *point = take(rows, 0, 3, err);
     if (point == NULL)
         return GBT_ERR_NO_MEMORY;
-    fprintf(out, "query,rank,ball,%s,x,y,z,radius\n", def->kind == GBT_QUERY_CROSSED ? "t" : "distance");
+    gbt_error why = {0};
     const gbt_status status = def->kind == GBT_QUERY_NEAREST
-                                  ? nearest(balls, def, point, rows->count, out, err)
-                                  : lists(balls, def, rows, point, out, err);
+                                  ? nearest(balls, def, point, rows->count, out, &why)
+                                  : lists(balls, def, rows, point, out, &why);
     mem_free(point);
-    return status;
+    if (status == GBT_ERR_ARGUMENT)
+        return base_fail(err, GBT_ERR_FORMAT, "%.400s: %s", def->at != NULL ? "at" : def->from, why.text);
+    return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 
 gbt_status gbt_query(const char *path, const gbt_query_def *def, FILE *out, gbt_error *err)

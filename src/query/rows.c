@@ -67,7 +67,7 @@ static gbt_status bad_width(const char *name, size_t line, size_t count, size_t 
 gbt_status query_rows_parse(const char *name, const char *text, size_t size, size_t least, size_t most,
                             query_rows *out, gbt_error *err)
 {
-    const char *at = text, *const end = text + size;
+    const char *at = text + file_mark_bytes(text, size), *const end = text + size;
     for (size_t line = 1; at < end; line++) {
         const char *stop = memchr(at, '\n', (size_t)(end - at));
         stop = stop != NULL ? stop : end;

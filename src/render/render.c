@@ -326,10 +326,12 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
     if (!orbit && (def->look_at != NULL || !isnan(def->orbit_radius) || !isnan(def->orbit_height)))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "look_at, orbit_radius, orbit_height: of an orbit (wanted the path orbit)");
-    if (def->orbit_radius <= 0 || def->orbit_radius > 1e9 || fabs(def->orbit_height) > 1e9)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "orbit_radius, orbit_height: %g, %g (wanted up to 1e+09, and a radius above 0)",
-                         def->orbit_radius, def->orbit_height);
+    if (def->orbit_radius <= 0 || def->orbit_radius > 1e9)
+        return base_fail(err, GBT_ERR_ARGUMENT, "orbit_radius: %g (wanted above 0, up to 1e+09)",
+                         def->orbit_radius);
+    if (fabs(def->orbit_height) > 1e9)
+        return base_fail(err, GBT_ERR_ARGUMENT, "orbit_height: %g (wanted -1e+09 to 1e+09)",
+                         def->orbit_height);
     if (def->path == NULL)
         return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants a path", out) : GBT_OK;
     if (def->camera != NULL)

@@ -230,6 +230,19 @@ static void expect_printed(const char *path, const gbt_query_def *def, const cha
     free(text);
 }
 
+/* Not even a header. */
+static void expect_refused_silently(const char *path, const gbt_query_def *def, const char *says)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    gbt_error err = {0};
+    assert_refused(gbt_query(path, def, out, &err), &err, GBT_ERR_FORMAT, says);
+    fclose(out);
+    assert_string_equal(text, "");
+    free(text);
+}
+
 static void files_of_balls_and_queries(void **state)
 {
     (void)state;
@@ -289,6 +302,22 @@ static void files_of_balls_and_queries(void **state)
         assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT,
                        "at:1: not a row of numbers");
     }
+    static const char *const beyond[] = {"0,nan,0", "-inf,0,0", "1e101,0,0"};
+    for (size_t i = 0; i < sizeof beyond / sizeof *beyond; i++) {
+        def.at = beyond[i];
+        expect_refused_silently(balls, &def, "at: query 0: points: bad query");
+    }
+    write_text(bad, "1 2 3\n1 2 nan\n");
+    def.at = NULL;
+    def.from = bad;
+    expect_refused_silently(balls, &def, "bad.txt: query 1: points: bad query");
+    def.kind = GBT_QUERY_CONTAINING;
+    expect_refused_silently(balls, &def, "bad.txt: query 1: points: bad query");
+    write_text(bad, "\xef\xbb\xbf"
+                    "1 2 0\r\n");
+    expect_printed(balls, &def, "query,rank,ball,distance,x,y,z,radius\n");
+    def.kind = GBT_QUERY_NEAREST;
+    def.from = NULL;
     def.at = "0 , 0\t,3, # a comma at the end may stay";
     expect_printed(balls, &def, "query,rank,ball,distance,x,y,z,radius\n0,0,0,3,0,0,0,1\n");
     def.at = "1,2,3";

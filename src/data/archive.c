@@ -70,7 +70,7 @@ gbt_status archive_put(sink *out, const char *path, const archive_member *member
     for (size_t i = 0; i < count; i++)
         total += members[i].size;
     if (total > UINT32_MAX - (1u << 20))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for such a file (limit 4 GiB)",
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu bytes are too many for a .zip archive (limit 4 GiB)",
                          path, total);
     zip_error_t why;
     zip_source_t *source = zip_source_buffer_create(NULL, 0, 0, &why);
@@ -108,7 +108,7 @@ static gbt_status open_archive(const source_file *file, zip_t **out, gbt_error *
     *out = source == NULL ? NULL : zip_open_from_source(source, ZIP_RDONLY, &why);
     gbt_status status = GBT_OK;
     if (*out == NULL) {
-        status = base_fail(err, GBT_ERR_FORMAT, "%s: no .zip archive, or damaged (%s)", file->name,
+        status = base_fail(err, GBT_ERR_FORMAT, "%s: not a .zip archive, or damaged (%s)", file->name,
                            zip_error_strerror(&why));
         zip_source_free(source);
     }

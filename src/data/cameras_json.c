@@ -41,7 +41,7 @@ static gbt_status read_camera(const json_t *entry, raw_place place, gbt_camera *
         return raw_fail(err, place,
                         "not a camera (wanted width, height, fx, fy, position [3] and rotation [3][3])");
     if (!dmat_is_rotation(out->rotation, 1e-3))
-        return raw_fail(err, place, "rotation is not one (wanted orthonormal within 1e-3, no reflection)");
+        return raw_fail(err, place, "not a rotation (wanted orthonormal within 1e-3, no reflection)");
     if (!(width >= 1 && width <= RAW_IMAGE_LIMIT && height >= 1 && height <= RAW_IMAGE_LIMIT))
         return raw_fail(err, place, "%g x %g pixels (wanted 1 to %d)", width, height, (int)RAW_IMAGE_LIMIT);
     out->model = GBT_CAMERA_PINHOLE;

@@ -59,7 +59,7 @@ gbt_status colmap_add_image(raw_scene *raw, const colmap_cameras *cameras, uint3
     const colmap_camera *found =
         cameras->count > 0 ? bsearch(&key, cameras->items, cameras->count, sizeof key, by_camera_id) : NULL;
     if (found == NULL)
-        return raw_fail(err, place, "image refers to camera %u, which is not there", camera_id);
+        return raw_fail(err, place, "image refers to camera %u, which does not exist", camera_id);
     raw_view *view = raw_next_view(raw, err);
     if (view == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -26,7 +26,7 @@ static gbt_status read_chunks(reading *r, gbt_error *err)
     GBT_TRY(cursor_need(&c, 20, "the header of glTF", err));
     const uint32_t magic = cursor_u32(&c), version = cursor_u32(&c);
     if (magic != GLB_MAGIC || version != 2)
-        return wrong(r, "no binary glTF 2.0", err);
+        return wrong(r, "not binary glTF 2.0", err);
     cursor_u32(&c); /* skip the total length */
     const uint32_t json_size = cursor_u32(&c);
     if (cursor_u32(&c) != GLB_JSON)
@@ -72,7 +72,7 @@ static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
             return GBT_OK;
         }
     }
-    return wrong(r, "no primitive with KHR_gaussian_splatting", err);
+    return wrong(r, "no primitive has KHR_gaussian_splatting", err);
 }
 
 /* Whether the node has this array of numbers, with values other than `wanted`. */
@@ -136,7 +136,10 @@ static gbt_status place_of(const reading *r, const json_t *nodes, const bool *ho
         const bool own = has_mesh(node, mesh_index);
         if (holds_mesh[i] &&
             (is_rotated_or_scaled(node) || (!own && differs(node, "translation", nowhere, 3))))
-            return wrong(r, "nodes with a matrix, rotation or scale, or one in another, are not read", err);
+            return wrong(r,
+                         "the Gaussians' node or a parent has a matrix, rotation or scale, or a parent a "
+                         "translation (not supported)",
+                         err);
         for (size_t k = 0; own && k < 3; k++)
             place[k] = json_number_value(json_array_get(translation, k));
         if (own && !(fabs(place[0]) < 1e12 && fabs(place[1]) < 1e12 && fabs(place[2]) < 1e12))
@@ -198,8 +201,6 @@ static size_t whole(const json_t *object, const char *key, size_t missing)
 static gbt_status find_column(reading *r, const char *name, const char *kind, size_t numbers, column *out,
                               gbt_error *err)
 {
-    char what[120];
-    snprintf(what, sizeof what, "%s is no array of numbers, %s, in the binary chunk", name, kind);
     const json_t *accessor = json_array_get(json_object_get(r->root, "accessors"),
                                             whole(r->attributes, name, SIZE_MAX)),
                  *view = json_array_get(json_object_get(r->root, "bufferViews"),
@@ -211,15 +212,21 @@ static gbt_status find_column(reading *r, const char *name, const char *kind, si
     const size_t record = out->width * numbers, in_view = whole(accessor, "byteOffset", 0),
                  from = whole(view, "byteOffset", 0);
     out->stride = whole(view, "byteStride", record);
-    if (view == NULL || out->width == 0 || !json_is_string(type) ||
-        strcmp(json_string_value(type), kind) != 0 || json_object_get(accessor, "sparse") != NULL ||
-        whole(view, "buffer", SIZE_MAX) != 0 || count == 0 || count == SIZE_MAX || in_view == SIZE_MAX ||
-        from == SIZE_MAX || out->stride < record || out->stride > 1 << 16)
-        return wrong(r, what, err);
+    if (accessor == NULL)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s is missing", r->file->name, name);
+    if (out->width == 0 || !json_is_string(type) || strcmp(json_string_value(type), kind) != 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s: wanted %s of floats, bytes or shorts",
+                         r->file->name, name, kind);
+    if (json_object_get(accessor, "sparse") != NULL)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s: sparse accessors are not supported",
+                         r->file->name, name);
     out->from = from + in_view;
-    if (out->from > r->data_size || r->data_size - out->from < record ||
+    if (view == NULL || whole(view, "buffer", SIZE_MAX) != 0 || count == 0 || count == SIZE_MAX ||
+        in_view == SIZE_MAX || from == SIZE_MAX || out->stride < record || out->stride > 1 << 16 ||
+        out->from > r->data_size || r->data_size - out->from < record ||
         (r->data_size - out->from - record) / out->stride < count - 1)
-        return wrong(r, what, err);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s: its values are not in the binary chunk",
+                         r->file->name, name);
     if (r->count != 0 && r->count != count)
         return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: %s has %zu values (wanted %zu)", r->file->name, name,
                          count, r->count);

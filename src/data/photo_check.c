@@ -120,5 +120,5 @@ void photo_check_warn(const photo_check *check, const char *data)
         log_warn("%s: photos with less than 1/%d of their camera's width or height: %zu", data,
                  (int)TINY_RATIO, check->tiny);
     if (check->exr > 0)
-        log_warn("%s: EXR photos, which are used as they are, values above 1 cut: %zu", data, check->exr);
+        log_warn("%s: EXR photos, used without tone mapping, values above 1 clipped: %zu", data, check->exr);
 }

@@ -178,7 +178,7 @@ static gbt_status load_blender(const char *train, const char *folder, raw_scene 
             raw->views[v].is_test = true;
         drop_repeated(raw, &dropped);
         if (dropped > 0)
-            log_warn("%s: photos that are trained on, and so not held out: %zu", path, dropped);
+            log_warn("%s: photos also listed for training, so not held out: %zu", path, dropped);
         raw->has_split = raw->view_count > first;
     }
     return raw_sort_views(raw, train, err);
@@ -367,9 +367,9 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
     if (raw->points_dropped > 0)
         log_warn("%s: points with unusable coordinates, dropped: %zu", path, raw->points_dropped);
     if (raw->tracks_missing > 0)
-        log_warn("%s: track entries of images that are not there: %zu", path, raw->tracks_missing);
+        log_warn("%s: track entries of images that are missing: %zu", path, raw->tracks_missing);
     if (raw->trailing_bytes > 0)
-        log_warn("%s: bytes behind the last record, ignored: %zu", path, raw->trailing_bytes);
+        log_warn("%s: bytes after the last record, ignored: %zu", path, raw->trailing_bytes);
     if (raw->photos_missing > 0)
         log_warn("%s: views left out because their photo is missing: %zu, %zu remain%s%s", path,
                  raw->photos_missing, raw->view_count, raw->missing_names[0] != '\0' ? ": " : "",
@@ -378,7 +378,7 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
     for (size_t i = 0; i < s->view_count; i++)
         masks += s->views[i].mask_path != NULL;
     if ((raw->has_masks || masks > 0) && masks < s->view_count)
-        log_warn("%s: without a mask, and so counted whole: %zu of %zu photos%s", path, s->view_count - masks,
+        log_warn("%s: photos without a mask, used completely: %zu of %zu%s", path, s->view_count - masks,
                  s->view_count, raw->has_masks ? " (wanted masks/NAME.png)" : "");
     if (raw->angles_disagreeing > 0)
         log_warn("%s: frames whose camera_angle_x contradicts fl_x, which is used: %zu", path,

@@ -85,7 +85,7 @@ static gbt_status read_meta(bundle *b, gbt_error *err)
     const json_int_t entries = json_integer_value(json_object_get(rest, "count")),
                      bands = json_integer_value(json_object_get(rest, "bands"));
     if (entries < 1 || entries > SOG_PALETTE_MAX || bands < 1 || bands > 3)
-        return wrong(b, "shN has no 1 to 65536 entries of 1 to 3 bands", err);
+        return wrong(b, "shN: wanted a count of 1 to 65536 and 1 to 3 bands", err);
     b->entries = (size_t)entries;
     b->degree = (int)bands;
     return take_levels(b, "shN", b->harmonics, err);
@@ -99,7 +99,7 @@ static gbt_status read_table(bundle *b, table_id id, gbt_error *err)
     const char *name = json_string_value(json_array_get(files, table_keys[id].file));
     char full[1024];
     if (name == NULL)
-        return wrong(b, "a table has no file", err);
+        return wrong(b, "a table names no file", err);
     const size_t per_entry = (size_t)((b->degree + 1) * (b->degree + 1)) - 1;
     const size_t wanted = id == CENTROIDS ? b->entries * per_entry : b->count;
     source_file inside = {.name = full};

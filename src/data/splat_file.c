@@ -33,8 +33,9 @@ static gbt_status read_splat(const source_file *file, gaussian_cloud *out, gbt_e
 {
     memset(out, 0, sizeof *out);
     if (file->size == 0 || file->size % ROW_BYTES != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .splat file (wanted a multiple of %d bytes, got %zu)",
-                         file->name, (int)ROW_BYTES, file->size);
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%s: not a .splat file (wanted a multiple of %d bytes, got %zu)", file->name,
+                         (int)ROW_BYTES, file->size);
     const size_t rows = file->size / ROW_BYTES;
     GBT_TRY(gaussian_cloud_alloc(out, rows, err));
     out->count = 0;

@@ -108,7 +108,7 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
         at = next;
     }
     if (missing > 0)
-        log_warn("%s: names of photos that are missing, passed over: %zu", path, missing);
+        log_warn("%s: names of missing photos, ignored: %zu", path, missing);
     return GBT_OK;
 }
 

@@ -99,12 +99,17 @@ static gbt_status read_table(cursor *c, frames *f, gbt_error *err)
     for (int i = 0; i < f->count; i++) {
         f->packed[i] = cursor_u64(c);
         const uint64_t bytes = cursor_u64(c), wanted = (uint64_t)f->header.count * row[i];
-        if (bytes != wanted || f->packed[i] > left || bytes / PACKED_LIMIT > f->packed[i])
+        if (bytes != wanted)
+            return base_fail(err, GBT_ERR_FORMAT,
+                             "%s@%zu: stream %d would unpack to %llu bytes (wanted %llu for %u Gaussians)",
+                             f->file->name, c->at - TABLE_ROW, i, (unsigned long long)bytes,
+                             (unsigned long long)wanted, f->header.count);
+        if (f->packed[i] > left || bytes / PACKED_LIMIT > f->packed[i])
             return base_fail(
                 err, GBT_ERR_FORMAT,
-                "%s@%zu: stream %d has %llu bytes in %llu (wanted %llu bytes, and %llu are left)",
-                f->file->name, c->at - TABLE_ROW, i, (unsigned long long)bytes,
-                (unsigned long long)f->packed[i], (unsigned long long)wanted, (unsigned long long)left);
+                "%s@%zu: stream %d cannot be %llu packed bytes (it unpacks to %llu; %llu are left)",
+                f->file->name, c->at - TABLE_ROW, i, (unsigned long long)f->packed[i],
+                (unsigned long long)bytes, (unsigned long long)left);
         left -= f->packed[i];
         f->plain[i] = (size_t)bytes;
         f->plain_all += (size_t)bytes;
@@ -134,9 +139,12 @@ static gbt_status read_header(const source_file *file, frames *f, gbt_error *err
                          f->header.version);
     GBT_TRY(spz_header_check(&f->header, file->name, err));
     const int wanted = f->header.degree == 0 ? SPZ_STREAMS - 1 : SPZ_STREAMS;
-    if (f->count != wanted || table_at < HEADER_BYTES || table_at > file->size)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: %d streams, their table at %u (wanted %d, %d to %zu)",
-                         file->name, f->count, table_at, wanted, (int)HEADER_BYTES, file->size);
+    if (f->count != wanted)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %d streams (wanted %d for degree %d)", file->name,
+                         f->count, wanted, f->header.degree);
+    if (table_at < HEADER_BYTES || table_at > file->size)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: the table of streams is at byte %u (wanted %d to %zu)",
+                         file->name, table_at, (int)HEADER_BYTES, file->size);
     c.at = table_at; /* skips extensions before the table */
     GBT_TRY(cursor_need(&c, (size_t)f->count * TABLE_ROW, "the table of streams", err));
     return read_table(&c, f, err);

@@ -145,8 +145,7 @@ static gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_err
     if (file->size >= 4 && memcmp(file->bytes, "NGSP", 4) == 0)
         return spz4_read(file, out, err);
     if (file->size < 18 || file->bytes[0] != 0x1f || file->bytes[1] != 0x8b || file->size > UINT32_MAX / 2)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .spz file (it does not begin as gzip does)",
-                         file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not an .spz file (wanted gzip data)", file->name);
     unsigned char *copy = mem_alloc(file->size, 1, "splats", err); /* zlib's input pointer is not const */
     if (copy == NULL)
         return GBT_ERR_NO_MEMORY;

@@ -35,8 +35,7 @@ static void warn_of_scales(const gaussian_cloud *cloud, const char *path)
         outside += level < -0.5 || level > 255.5;
     }
     if (outside > 0)
-        log_warn("%s: Gaussians that .spz makes larger or smaller: %zu (wanted 4.5e-5 to 379 units)", path,
-                 outside);
+        log_warn("%s: Gaussians whose scale is clamped: %zu (.spz keeps 4.5e-5 to 379 units)", path, outside);
 }
 
 gbt_status spz_header_of(const gaussian_cloud *cloud, const double origin[3], unsigned version,
@@ -127,11 +126,14 @@ void spz_put_stream(sink *s, const gaussian_cloud *cloud, const double origin[3]
 gbt_status spz_header_check(const spz_header *header, const char *name, gbt_error *err)
 {
     const int degree_max = header->version == 4 ? 4 : 3;
-    if (header->degree > degree_max || header->fraction > 24 || header->count == 0)
-        return base_fail(
-            err, GBT_ERR_FORMAT,
-            "%s: %u Gaussians, degree %d, %d fractional bits (wanted 1 or more, 0 to %d, 0 to 24)", name,
-            header->count, header->degree, header->fraction, degree_max);
+    if (header->count == 0)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: holds no Gaussians", name);
+    if (header->degree > degree_max)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: spherical harmonics of degree %d (wanted 0 to %d)", name,
+                         header->degree, degree_max);
+    if (header->fraction > 24)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: %d fractional bits (wanted 0 to 24)", name,
+                         header->fraction);
     return GBT_OK;
 }
 

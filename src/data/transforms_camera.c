@@ -138,7 +138,7 @@ static gbt_status find_focal(const transforms_frame *s, const gbt_camera *camera
     GBT_TRY(focal_from_angle(s, 'x', camera->width, &from_angle[0], err));
     GBT_TRY(focal_from_angle(s, 'y', camera->height, &from_angle[1], err));
     if (!has_x && !has_y && from_angle[0] == 0 && from_angle[1] == 0)
-        return transforms_fail(s, err, "neither fl_x nor camera_angle_x is there", "focal length");
+        return transforms_fail(s, err, "neither fl_x nor camera_angle_x is given", "focal length");
     if (has_x && from_angle[0] > 0 && fabs(from_angle[0] - focal[0]) > 0.01 * fabs(focal[0]))
         out->angles_disagreeing++;
     if (!has_x)

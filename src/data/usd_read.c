@@ -154,7 +154,7 @@ static gbt_status add_number(reading *r, prim *p, field_id f, token t, gbt_error
     double value;
     const number_result result = number_parse_double(t.at, t.length, &value);
     if (result == NUMBER_BAD)
-        return fail(r, "no number in a list of numbers", err);
+        return fail(r, "not a number, in a list of numbers", err);
     if (f == TRANSLATE && n->count < 3)
         p->translate[n->count] = value;
     void *grown = n->values;
@@ -253,7 +253,7 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
         p->ignored_transform |= transform_depth != 0;
         return GBT_OK;
     }
-    return base_fail(err, GBT_ERR_FORMAT, "%s: has no prim of the type %s", r->file->name, prim_type);
+    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no prim of type %s", r->file->name, prim_type);
 }
 
 /* Whether an ancestor of the prim just read has a transformation that comes later in the text. */
@@ -330,10 +330,9 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);
     if (p->ignored_transform)
-        log_warn(
-            "%s: the prim's rotation and scale are left out, and all transformations of the prims that it is "
-            "in; its own coordinates are read, and its translation",
-            r->file->name);
+        log_warn("%s: only the translation of the Gaussians' prim is used; its rotation and scale, and the "
+                 "transformations of its parents, are ignored",
+                 r->file->name);
     return out->count > 0 ? GBT_OK
                           : base_fail(err, GBT_ERR_FORMAT, "%s: holds no usable Gaussian (%zu dropped)",
                                       r->file->name, out->dropped);
@@ -346,10 +345,10 @@ gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *er
     prim p = {0};
     memset(out, 0, sizeof *out);
     if (file->size >= 8 && memcmp(file->bytes, "PXR-USDC", 8) == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: is binary USD (wanted text, which usdcat makes of it)",
+        return base_fail(err, GBT_ERR_FORMAT, "%s: binary USD (wanted text: convert it with usdcat)",
                          file->name);
     if (file->size < 6 || memcmp(file->bytes, "#usda ", 6) != 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no USD text (wanted a file that begins with #usda)",
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not USD text (wanted a file that begins with #usda)",
                          file->name);
     const gbt_status status = read_text(&r, &p, out, err);
     for (int f = 0; f < FIELDS; f++)

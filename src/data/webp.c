@@ -44,7 +44,7 @@ gbt_status webp_read(const source_file *file, size_t pixel_limit, webp_table *ou
     *out = (webp_table){0};
     WebPBitstreamFeatures features;
     if (WebPGetFeatures(file->bytes, file->size, &features) != VP8_STATUS_OK || features.has_animation)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .webp picture, or damaged", file->name);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a .webp picture, or damaged, or animated", file->name);
     const size_t pixels = (size_t)features.width * (size_t)features.height;
     if (pixels > pixel_limit)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %d x %d pixels (wanted %zu at most)", file->name,

@@ -135,7 +135,7 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
         for (size_t j = 0; j < i && status == GBT_OK; j++)
             if (strcmp(sections[j].name, sections[i].name) == 0)
                 status =
-                    base_fail(err, GBT_ERR_FORMAT, "%s: section %s is there twice", path, sections[i].name);
+                    base_fail(err, GBT_ERR_FORMAT, "%s: section %s occurs twice", path, sections[i].name);
     }
     if (status == GBT_OK && end != byte_count)
         status = base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %zu bytes belong to no section", path, end,

@@ -14,13 +14,14 @@ static gbt_status read_header(const source_file *file, json_t **root, size_t *da
     const uint64_t length = cursor_u64(&c);
     if (length > HEADER_LIMIT || length > cursor_left(&c))
         return base_fail(err, GBT_ERR_FORMAT,
-                         "%s: no .safetensors file (its header would have %llu bytes, %zu follow)",
+                         "%s: not a .safetensors file (its header would have %llu bytes, but %zu follow)",
                          file->name, (unsigned long long)length, cursor_left(&c));
     json_error_t fault;
     *root =
         json_loadb((const char *)file->bytes + LENGTH_BYTES, (size_t)length, JSON_REJECT_DUPLICATES, &fault);
     if (*root == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: no .safetensors file: header: %s", file->name, fault.text);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: not a .safetensors file: header: %s", file->name,
+                         fault.text);
     *data_at = LENGTH_BYTES + (size_t)length;
     return GBT_OK;
 }

@@ -20,7 +20,7 @@ static void cameras(void **state)
         const char *says;
     } cases[] = {
         {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_OK, ""},
-        {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,2,0]]") "]", GBT_ERR_FORMAT, "frame 0: rotation is not one"},
+        {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,2,0]]") "]", GBT_ERR_FORMAT, "frame 0: not a rotation"},
         {"[" CAMERA("a", "[[0,0,1],[-1,0,0],[0,1,0]]") "]", GBT_ERR_FORMAT, "no reflection"},
         {"[" CAMERA("../a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_ERR_FORMAT, "'..'"},
         {"[" CAMERA("a", "[[0,0,1],[1,0,0]]") "]", GBT_ERR_FORMAT, "not a camera"},

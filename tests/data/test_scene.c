@@ -240,13 +240,13 @@ static void masks_are_found(void **state)
     write_picture(in_folder("masks/other.png"), 8, 6);
     assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     assert_null(s.views[0].mask_path);
-    assert_non_null(strstr(text, "counted whole: 9 of 9 photos (wanted masks/NAME.png)"));
+    assert_non_null(strstr(text, "used completely: 9 of 9 (wanted masks/NAME.png)"));
     scene_free(&s);
     for (int i = 0; i < 2; i++)
         write_picture(in_folder("%s", files[i]), 8, 6);
     assert_ok(scene_load(test_folder, NULL, &s, &assert_ok_err_));
     gbt_listen(NULL, NULL);
-    assert_non_null(strstr(text, "counted whole: 7 of 9 photos"));
+    assert_non_null(strstr(text, "used completely: 7 of 9"));
     for (int i = 0; i < 2; i++)
         assert_string_equal(s.views[i].mask_path, in_folder("%s", files[i]));
     assert_null(s.views[2].mask_path);
@@ -446,7 +446,7 @@ static void missing_photos_on_a_list(void **state)
     gbt_listen(keep_first, text);
     assert_ok(scene_load(test_folder, &by_list, &s, &assert_ok_err_));
     gbt_listen(NULL, NULL);
-    assert_non_null(strstr(text, "list.txt: names of photos that are missing, passed over: 2"));
+    assert_non_null(strstr(text, "list.txt: names of missing photos, ignored: 2"));
     assert_true(s.view_count == VIEW_COUNT - 2 && count_tests(&s) == 1 && s.views[6].is_test);
     scene_free(&s);
     static const char *const bad[] = {"v5.png\nv22.png\n", "v5.png\nv\n", "v5.png\nv2.pn\n"};
@@ -770,9 +770,9 @@ static void blender_without_a_split(void **state)
         {BLENDER "]}", NULL, "", 2, false, "train/0"},
         {BLENDER "]}", BLENDER VIEW("val/0", "5") "]}", "", 3, true, "val/0"},
         {BLENDER VIEW("train/0", "1") "," VIEW("./train/1", "2") "]}", NULL,
-         "transforms_test.json: photos that are trained on, and so not held out: 2", 2, false, "train/0"},
+         "transforms_test.json: photos also listed for training, so not held out: 2", 2, false, "train/0"},
         {BLENDER VIEW("train/0.png", "1") "," VIEW("val/0", "2") "]}", BLENDER "]}",
-         "transforms_test.json: photos that are trained on, and so not held out: 1", 3, true, "val/0"},
+         "transforms_test.json: photos also listed for training, so not held out: 1", 3, true, "val/0"},
     };
     char text[300];
     scene s;

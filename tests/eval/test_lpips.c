@@ -258,7 +258,7 @@ static void refusals(void **state)
     write_network(&narrow, in_folder("a.safetensors"), NULL);
     assert_refused(in_folder("a.safetensors"), "neither VGG16 nor AlexNet");
     assert_ok(file_write_atomic(in_folder("a.safetensors"), "P6 1 1 255 xx", 13, NULL));
-    assert_refused(in_folder("a.safetensors"), "no .safetensors file");
+    assert_refused(in_folder("a.safetensors"), "not a .safetensors file");
     free_network(&alex);
 }
 

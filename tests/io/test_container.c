@@ -281,7 +281,7 @@ static void two_sections_of_one_name(void **state)
     container c;
     gbt_error err = {0};
     assert_int_equal(container_parse(bytes, byte_count, "memory", &c, &err), GBT_ERR_FORMAT);
-    assert_string_equal(err.text, "memory: section floats is there twice");
+    assert_string_equal(err.text, "memory: section floats occurs twice");
     mem_free(bytes);
 }
 

@@ -11,8 +11,9 @@ static const option *options(int *count)
     static const option rows[] = {
         RUN_OPTION("model-paths"),
         DATA_OPTION(&def.data, "data set in place of the one it was trained on"),
-        JSON_OPTION(&def.json,
-                    "write the scores there too; the only file with other settings than the run's own"),
+        JSON_OPTION(
+            &def.json,
+            "also write the scores to this file; with settings other than the run's, only to this file"),
         {.name = "renderer",
          .kind = OPTION_CHOICE,
          .value = &def.renderer,

@@ -65,14 +65,14 @@ static const option *options(int *count)
          .min = 0,
          .max = 0.1,
          .value_name = "X",
-         .help = "standard deviation of a sparse point, as a fraction of its distance"},
+         .help = "noise of the sparse points: standard deviation, as a fraction of their distance"},
         {.name = "samples",
          .kind = OPTION_INT,
          .value = &def.samples,
          .min = 1,
          .max = 1024,
          .value_name = "N",
-         .help = "rays per pixel at most"},
+         .help = "maximum number of rays per pixel"},
         {.name = "seed", .kind = OPTION_UINT64, .value = &def.seed, .value_name = "S", .help = "random seed"},
         {.name = "depth", .kind = OPTION_FLAG, .value = &def.depth, .help = "also write exact depth images"},
         {.name = "gaussians",
@@ -86,8 +86,9 @@ static const option *options(int *count)
          .kind = OPTION_CHOICE,
          .value = &def.lens,
          .choices = GBT_MAKE_SCENE_LENS_NAMES,
-         .help = "of all cameras; fisheye: 180 degrees across the shorter side; panorama: twice as wide as "
-                 "high; rolling: a pinhole that moves while its rows are read out"},
+         .help =
+             "lens of all cameras; fisheye: 180 degrees across the shorter side; panorama: twice as wide as "
+             "high; rolling: a pinhole that moves while its rows are read out"},
         MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

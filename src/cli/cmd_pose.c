@@ -18,7 +18,7 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &out,
          .value_name = "DATA",
-         .help = "folder for the data set; the same command goes on after an interruption",
+         .help = "folder for the data set; after an interruption, the same command continues",
          .required = true},
         {.name = "frames",
          .kind = OPTION_INT,
@@ -26,7 +26,7 @@ static const option *options(int *count)
          .min = 0,
          .max = 2000,
          .value_name = "N",
-         .help = "frames to take from a video; 0: three a second, 60 to 200"},
+         .help = "frames to take from a video; 0: three per second, but 60 to 200"},
         {.name = "camera-model",
          .kind = OPTION_CHOICE,
          .value = &def.camera_model,
@@ -36,7 +36,8 @@ static const option *options(int *count)
          .kind = OPTION_CHOICE,
          .value = &def.matcher,
          .choices = GBT_POSE_MATCHER_NAMES,
-         .help = "which pairs are matched; auto: all, of many those near in time or by GPS"},
+         .help = "which pairs of photos are matched; auto: all of few photos, of many those near in time or "
+                 "by GPS"},
     };
     *count = sizeof rows / sizeof *rows;
     return rows;

@@ -26,7 +26,8 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &def.at,
          .value_name = "X,Y,Z",
-         .help = "one query; of crossed X,Y,Z,DX,DY,DZ and perhaps ,TMIN,TMAX: origin, direction, part"},
+         .help = "one query point; for crossed a ray: X,Y,Z,DX,DY,DZ[,TMIN,TMAX] (origin, direction, part of "
+                 "the ray)"},
         {.name = "from",
          .kind = OPTION_STRING,
          .value = &def.from,
@@ -41,7 +42,7 @@ static const option *options(int *count)
          .min = 1,
          .max = 1000000,
          .value_name = "K",
-         .help = "how many"},
+         .help = "number of nearest balls to find"},
         {.name = "radius",
          .of = "within overlapping",
          .kind = OPTION_DOUBLE,
@@ -49,7 +50,7 @@ static const option *options(int *count)
          .min = 0,
          .max = 1e100,
          .value_name = "R",
-         .help = "of the ball"},
+         .help = "radius around each query point"},
         MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

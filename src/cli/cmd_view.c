@@ -34,8 +34,8 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &def.host,
          .value_name = "ADDRESS",
-         .help = "listen at this IPv4 address of the machine, 0.0.0.0: at all; others than 127.0.0.1 answer "
-                 "only with the token printed"},
+         .help = "IPv4 address of this machine to listen at; 0.0.0.0: all of them; with any but 127.0.0.1, "
+                 "browsers need the token that is printed"},
         DATA_OPTION(&def.data, "photos of another data set"),
         MEMORY_OPTION,
     };

@@ -57,7 +57,7 @@ extern int options_threads; /* --threads, a common option; passed on to the libr
     {                                                                                                        \
         .name = "memory", .kind = OPTION_SIZE, .value = &options_memory, .min = 0, .max = 0x1p60,            \
         .value_name = "BYTES",                                                                               \
-        .help = "memory to take at most, such as 1G (docs/memory.md); does not change the result; 0: no "    \
+        .help = "upper limit for memory, such as 1G (docs/memory.md); does not change the result; 0: no "    \
                 "limit",                                                                                     \
         .rare = true                                                                                         \
     }

@@ -25,15 +25,14 @@
 static const gbt_train_setting settings[] = {
     {NAMED("budget-seconds", budget_seconds), .option = "budget", RANGE(SECONDS, 0, 1e9, "TIME"), .number = 0,
      .saved = true,
-     .help = "training time in all, such as 90s, 10min or 1h; the schedule is fitted to it; 0: 10min"},
+     .help = "total training time, such as 90s, 10min or 1h; the schedule is fitted to it; 0: 10min"},
     {NAMED("iterations", iterations), RANGE(UINT64, 0, 1e15, "N"), .number = 0, .saved = true,
      .help = "number of iterations instead of a time budget; 0: the budget decides",
      .aliases = "max-steps num-iters"},
     {NAMED("views", views), RANGE(INT, 1, 64, "V"), .number = 1, .saved = true, .if_changed = true,
      .rare = true,
-     .help =
-         "photos that a step looks at, a power of two; learning rates are multiplied by the square root of "
-         "it (docs/cluster.md)",
+     .help = "photos per step, a power of two; learning rates are multiplied by the square root of "
+             "it (docs/cluster.md)",
      .aliases = "batch-size"},
     {NAMED("init", init), CHOICE(GBT_INIT_NAMES), .number = GBT_INIT_GB, .saved = true,
      .help =
@@ -67,22 +66,22 @@ static const gbt_train_setting settings[] = {
      .help = "anti-aliasing: variance of a ray's pixel footprint, px^2; 0: infinitely thin rays"},
     {NAMED("near", near), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
      .help = "near clipping distance, as a fraction of the nearest depth at which the photos see sparse "
-             "points; at least 2 % of the median distance, but for a photo with nearer points of its own"},
+             "points; at least 2 % of the median distance, except for photos that see nearer points"},
     {NAMED("step-pixels", step_pixels), RANGE(INT, 0, 1e9, "N"), .number = 50000, .saved = true, .rare = true,
-     .help = "about how many pixels of its photo a step looks at, others each time; 0: all"},
+     .help = "approximate number of pixels per step, a new random subset of the photo each time; 0: all"},
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",
      .choices = "auto|every=8|none|validate=8", .saved = true,
      .help = "held-out photos: auto (as the data set says, else every=8), every=N, every=N:K (from photo K "
-             "on), none, list=FILE; validate=N: every N-th of the others in their place, to choose settings "
-             "by"},
+             "on), none, list=FILE; validate=N: instead, every N-th of the training photos, to choose "
+             "settings by"},
     {NAMED("alpha", alpha), CHOICE(GBT_ALPHA_NAMES), .number = GBT_ALPHA_AUTO, .saved = true,
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
              "white for Blender scenes, else and with compat black"},
     {NAMED("background", background), CHOICE(GBT_BACKGROUND_NAMES), .number = GBT_BACKGROUND_CONSTANT,
-     .saved = true, .if_changed = true, .help = "one colour, or learned colours by direction"},
-    {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true,
-     .help = "of everything that is random"},
+     .saved = true, .if_changed = true,
+     .help = "a constant colour, or a learned sky that depends on direction"},
+    {NAMED("seed", seed), RANGE(UINT64, 0, 0, "S"), .number = 0, .saved = true, .help = "random seed"},
     {NAMED("max-anchors", max_anchors), RANGE(UINT64, 1, 1e8, "N"), .number = 2000000, .saved = true,
      .rare = true, .help = "maximum number of anchors"},
     {NAMED("grow", grow), FLAG, .rare = true, .number = 1, .saved = true,
@@ -93,16 +92,16 @@ static const gbt_train_setting settings[] = {
              "larger"},
     {NAMED("final-prune-factor", final_prune_factor), RANGE(DOUBLE, 1, 100, "F"), .number = 4, .saved = true,
      .rare = true,
-     .help = "multiply the threshold of pruning once more in the last tenth of growing, when none are "
-             "added; 1: no change"},
+     .help = "also multiply the threshold of pruning by this in the last tenth of the growth phase, "
+             "when no anchors are added; 1: no change"},
     {NAMED("compat", compat), FLAG, .rare = true, .saved = true,
      .help = "follow the reference implementation in every detail (docs/compat.md)"},
     {NAMED("exposure", exposure), FLAG, .saved = true,
      .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
     {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
-     .help = "do not turn exposure on where the photos' exposures differ"},
+     .help = "do not turn exposure on automatically where the photos' exposures differ"},
     {NAMED("refine-poses", refine_poses), FLAG, .saved = true, .if_changed = true,
-     .help = "learn the photos' poses, too, where they are not exact"},
+     .help = "also correct the photos' poses, for data sets whose poses are not exact"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .saved = true, .rare = true,
      .help = "train by splatting up to this fraction of the run, then by ray tracing"},
     {NAMED("grow-until", grow_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
@@ -120,14 +119,14 @@ static const gbt_train_setting settings[] = {
     {NAMED("tensorboard", tensorboard), FLAG, .rare = true,
      .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
     {NAMED("resume", resume), FLAG,
-     .help = "go on with RUN from its last checkpoint, with its settings and data; with other iterations or "
-             "another "
-             "budget to that length in all, also when it was finished"},
-    {NAMED("overwrite", overwrite), FLAG, .help = "train anew in a folder that holds a run, which is lost"},
+     .help =
+         "resume RUN from its last checkpoint, with its settings and data; given other iterations or another "
+         "budget, train up to that total, even if the run was finished"},
+    {NAMED("overwrite", overwrite), FLAG, .help = "replace a run that the folder already holds: it is lost"},
     {NAMED("lossless", lossless), FLAG, .saved = true, .if_changed = true, .rare = true,
      .help = "store the model without loss (see compress); the file is about seven times larger"},
     {NAMED("memory", memory), RANGE(BYTES, 0, 0x1p60, "BYTES"),
-     .help = "memory to take at most, such as 4G (docs/memory.md); does not change the result; 0: no limit"},
+     .help = "upper limit for memory, such as 4G (docs/memory.md); does not change the result; 0: no limit"},
 };
 
 enum { SETTING_COUNT = sizeof settings / sizeof *settings };

@@ -20,7 +20,7 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
     const bool is_plain = bench_scene_needs_camera(path);
     if (camera == NULL && is_plain)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json)", path);
+                         "%.300s: plain Gaussians have no cameras (wanted --camera FILE.json)", path);
     if (camera != NULL) {
         GBT_TRY(loaded_run_open_model(path, run, err));
         GBT_TRY(camera_file_read(camera, run->model.origin, &out->camera, err));

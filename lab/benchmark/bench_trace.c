@@ -109,7 +109,7 @@ static void print_head(const measured *m, FILE *out)
             s->rays.width, s->rays.height, parallel_threads(), cpu_isa_name(m->ways[0].isa));
     for (size_t k = 0; k < m->count; k++)
         if (m->kernel[k] == TRACE_LIST && !m->ways[k].traced.listed)
-            fputs("list: these rays walk the tree\n", out);
+            fputs("list: not possible for these rays; the tree is traversed instead\n", out);
     fprintf(out, "alpha_min %g, alpha_max %g, T_min %g; medians of %d\n\n", (double)s->settings.alpha_min,
             (double)s->settings.alpha_max, (double)s->settings.transmittance_min, m->def->repeats);
 }

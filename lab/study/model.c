@@ -57,7 +57,7 @@ gbt_status study_model_camera(const char *path, const char *given, char *out, si
     if (given == NULL && !file_exists(out))
         return base_fail(
             err, GBT_ERR_ARGUMENT,
-            "%.300s: plain Gaussians know no cameras (wanted --camera FILE.json, or camera.json beside it)",
+            "%.300s: plain Gaussians have no cameras (wanted --camera FILE.json, or camera.json beside it)",
             path);
     return GBT_OK;
 }

@@ -77,7 +77,7 @@ const char *paper_verdict_of(const stat_sample *ours, double published, const do
     if (!has_paper)
         return ours->mean < 0 ? "lower, beyond the spread" : "higher, beyond the spread";
     if ((ours->mean < 0) != (published < 0))
-        return "the other way than the paper";
+        return "opposite to the paper";
     if (!stat_is_apart(ours, published))
         return "agrees with the paper";
     if (ours->mean >= range[0] && ours->mean <= range[1])

@@ -224,7 +224,8 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
     anew.overwrite = true;
     const gbt_status status = gbt_train(data, run, &anew, &why);
     if (status == GBT_ERR_INTERRUPTED)
-        return base_fail(err, status, "%.400s: interrupted; the same command goes on with this run", run);
+        return base_fail(err, status, "%.400s: interrupted; run the same command again to continue this run",
+                         run);
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 

@@ -159,7 +159,7 @@ static void verdicts(void **state)
                  {{-12.1, -12.1, -12.1}, 3, -10, "the same way as the paper, and more"},
                  {{-3, -3.1, -3.2}, 3, -10, "the same way as the paper, but less"},
                  {{-20, -21, -22}, 3, -10, "the same way as the paper, and more"},
-                 {{3, 3.1, 3.2}, 3, -10, "the other way than the paper"},
+                 {{3, 3.1, 3.2}, 3, -10, "opposite to the paper"},
                  {{-3, 1, 2}, 3, -10, "not told apart from zero, but from the paper"},
                  {{-30, 1, 2}, 3, -10, "told apart neither from zero nor from the paper"},
                  {{-30, 1, 2}, 3, NAN, "not told apart from zero"},

@@ -80,9 +80,10 @@ gbt_status child_start(child *c, const char *const *arguments, const char *log_p
     child_kill(c);
     if (code != ENOENT)
         return base_fail(err, GBT_ERR_IO, "%s: does not start: %s", arguments[0], strerror(code));
-    return base_fail(err, GBT_ERR_IO,
-                     "%s: this program is needed, and is not there (Debian, Ubuntu: sudo apt-get install %s)",
-                     arguments[0], arguments[0]);
+    return base_fail(
+        err, GBT_ERR_IO,
+        "%s: this program is needed, but not installed (Debian, Ubuntu: sudo apt-get install %s)",
+        arguments[0], arguments[0]);
 }
 
 /* Signal the whole process group, because the program may be a script that started others. */
@@ -152,14 +153,14 @@ gbt_status child_end(child *c, const char *last, gbt_error *err)
         return GBT_OK;
     const int state = wait_for(c);
     if (c->stop_requested || stop_signal_seen())
-        return base_fail(err, GBT_ERR_INTERRUPTED, "interrupted: the same command goes on");
+        return base_fail(err, GBT_ERR_INTERRUPTED, "interrupted: run the same command again to continue");
     if (WIFEXITED(state) && WEXITSTATUS(state) == 0)
         return GBT_OK;
     if (WIFSIGNALED(state))
         return base_fail(err, GBT_ERR_IO, "%s: ended by signal %d%s (log: %s)", c->name, WTERMSIG(state),
                          WTERMSIG(state) == SIGKILL ? ", as when memory runs out" : "", c->log_path);
     return base_fail(err, GBT_ERR_IO, "%s: failed (code %d): %.200s (log: %s)", c->name, WEXITSTATUS(state),
-                     last[0] != '\0' ? last : "it said nothing", c->log_path);
+                     last[0] != '\0' ? last : "no output", c->log_path);
 }
 
 void child_kill(child *c)

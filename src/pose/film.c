@@ -103,7 +103,7 @@ static gbt_status take(measuring *m, unsigned char *out, size_t count, size_t *g
 
 static gbt_status odd_output(gbt_error *err)
 {
-    return base_fail(err, GBT_ERR_IO, "ffmpeg: its output is not as wanted (wanted PGM pictures)");
+    return base_fail(err, GBT_ERR_IO, "ffmpeg: unexpected output (wanted PGM pictures)");
 }
 
 /* Read a number of the PGM header and the blank after it. */

@@ -83,7 +83,8 @@ static gbt_status set_folders(job *j, const char *source, const char *data, gbt_
             "the photos in %s)",
             data, j->images);
     if (!j->is_film && j->def.frames != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "frames: of a film (%.1000s is a folder of photos)", source);
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames: only for a film (%.1000s is a folder of photos)",
+                         source);
     return GBT_OK;
 }
 
@@ -149,10 +150,11 @@ static gbt_status compare_settings(const job *j, const char *path, const sink *n
     mem_free(then);
     return same || status != GBT_OK
                ? status
-               : base_fail(err, GBT_ERR_ARGUMENT,
-                           "%s: was begun with other photos or options, which %s lists (go on with those, or "
-                           "name another folder)",
-                           j->data, path);
+               : base_fail(
+                     err, GBT_ERR_ARGUMENT,
+                     "%s: was begun with other photos or options, listed in %s (use the same, or choose "
+                     "another folder)",
+                     j->data, path);
 }
 
 /* DATA must be a folder that gbt_pose() made, or contain nothing that it would overwrite. */
@@ -168,7 +170,7 @@ static gbt_status check_folder(const job *j, gbt_error *err)
         file_kind kind;
         GBT_TRY(file_look(not_ours[i], &kind, err));
         if (kind != FILE_NONE)
-            return base_fail(err, GBT_ERR_ARGUMENT, "%s: is there already (name another folder)",
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: already exists (choose another folder)",
                              not_ours[i]);
     }
     return GBT_OK;

@@ -35,9 +35,9 @@ mkdir "my photos" && cp five/images/*.png "my photos/"
 
 says "no photos" 3 "^error: .*three/sparse: 0 photos (wanted 3 or more, PNG or JPEG)" pose three/sparse -o a
 says "nothing there" 4 "^error: nothing: no such file or folder" pose nothing -o a
-says "frames of photos" 2 "^error: --frames: of a film (my photos is a folder of photos)" pose "my photos" -o a --frames 50
+says "frames of photos" 2 "^error: --frames: only for a film (my photos is a folder of photos)" pose "my photos" -o a --frames 50
 says "photos and data in one folder" 2 "^error: my photos: the photos are in the folder itself" pose "my photos" -o "my photos"
-says "a folder that holds another data set" 2 "^error: three/sparse: is there already (name another folder)" pose "my photos" -o three
+says "a folder that holds another data set" 2 "^error: three/sparse: already exists (choose another folder)" pose "my photos" -o three
 [ ! -e three/colmap ] && [ ! -e a ]
 report $? "and nothing was made" "$(ls three)"
 says "train names the command" 3 "^error: my photos: photos without camera poses (find them with: gbtrace pose 'my photos' -o DATA)" train "my photos" -o run
@@ -51,7 +51,7 @@ says "train, of the same photos" 3 "^error: phone: photos without camera poses" 
 # ---- no tools
 mkdir none
 tools=$work/none
-says "no colmap" 4 "^error: colmap: this program is needed, and is not there (Debian, Ubuntu: sudo apt-get install colmap)" pose "my photos" -o a
+says "no colmap" 4 "^error: colmap: this program is needed, but not installed (Debian, Ubuntu: sudo apt-get install colmap)" pose "my photos" -o a
 tools=$work/tools:$PATH
 
 # ---- a false colmap: FALSE_COLMAP says what goes wrong, and where (false_colmap.py)
@@ -237,7 +237,7 @@ printf '#!/bin/sh\necho "Invalid data found when processing input" >&2\nexit 1\n
 chmod +x tools/ffmpeg
 says "ffmpeg fails" 4 "^error: ffmpeg: failed (code 1): Invalid data found when processing input (log: film/colmap/measure.log)" pose film.mp4 -o film
 printf '#!/bin/sh\necho "P5 what is this"\n' >tools/ffmpeg
-says "ffmpeg gives something else" 4 "^error: ffmpeg: its output is not as wanted" pose film.mp4 -o film
+says "ffmpeg gives something else" 4 "^error: ffmpeg: unexpected output" pose film.mp4 -o film
 [ ! -e film/images ]
 report $? "no frames are left" "$(ls -R film)"
 cat >tools/ffmpeg <<'END'

@@ -71,7 +71,7 @@ static gbt_status draw_part(const picture *p, const cell_part *part, size_t firs
     if (cell_is_chunk(d->store, part))
         return base_fail(
             err, GBT_ERR_NO_MEMORY,
-            "memory: %zu MiB is too little for the Gaussians of one place (wanted more than %zu there)",
+            "memory: %zu MiB is too little: the Gaussians of one place alone need more than %zu MiB",
             d->memory >> 20, d->budget >> 20);
     for (int k = 0; k < 2; k++) {
         const cell_part child = cell_child_from_eye(d, part, k);

@@ -169,7 +169,7 @@ static gbt_status find_budget(cell_drawer *d, gbt_error *err)
     const size_t pixels = ray_image_count(&d->rays), least = base_bytes + cell_bytes_least + pixel * pixels;
     if (d->memory < least)
         return base_fail(err, GBT_ERR_NO_MEMORY,
-                         "memory: %zu MiB is too little for a picture of %d x %d (wanted %zu)",
+                         "memory: %zu MiB is too little for a picture of %d x %d (wanted %zu MiB)",
                          d->memory >> 20, d->rays.width, d->rays.height, (least >> 20) + 1);
     d->budget = d->memory - base_bytes - pixel * pixels;
     if (d->cell_bytes > 0 && d->cell_bytes < d->budget)
@@ -184,14 +184,14 @@ gbt_status cell_view_start(cell_drawer *d, const ray_shot *shot, gbt_error *err)
     GBT_TRY(ray_shot_check(shot, err));
     if (ray_shot_sample_count(shot) > 1 || shot->aperture_radius > 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "memory: an open aperture is not drawn cell by cell (wanted rays from one point)");
+                         "picture: an open aperture cannot be drawn within a memory limit (wanted no limit, "
+                         "or a pinhole)");
     ray_image_free(&d->rays); /* with the lenses of other pictures, which PIXEL_BYTES does not count */
     GBT_TRY(ray_image_from_shot(shot, 0, &d->rays, err));
     if (!d->rays.common_origin)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "memory: rays that start at different points are not drawn cell by cell (a rolling shutter, "
-            "an orthographic camera)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "picture: a rolling shutter or an orthographic camera cannot be drawn within a "
+                         "memory limit (wanted no limit, or rays from one point)");
     GBT_TRY(find_budget(d, err));
     GBT_TRY(reserve_rays(d, err));
     GBT_TRY(view_bounds_find(shot, &d->rays, &d->bounds, err));

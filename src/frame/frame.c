@@ -224,8 +224,8 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
         if (tracer != NULL || shot->given != NULL || shot->aperture_radius > 0 ||
             !camera_is_still(&shot->camera))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "the rasterizer draws what a pinhole camera sees that stands still, and no "
-                             "more; trace this picture");
+                             "renderer: splats can only draw a still pinhole camera (wanted trace for this "
+                             "picture)");
         return frame_render(f, subject, &shot->camera, settings, false, err);
     }
     GBT_TRY(prepare(f, subject, shot, settings, tracer, err));

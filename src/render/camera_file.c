@@ -61,12 +61,12 @@ static gbt_status take_lens(const json_fields *r, gbt_camera *camera)
     if (has_fov)
         GBT_TRY(json_field_needed(r, "fov_x_deg", "degrees from the left edge of the picture to the right"));
     else if (json_field_given(r, "fov_x_deg"))
-        return json_field_fail(r, "fov_x_deg", "this model has none (wanted it with pinhole or fisheye)");
+        return json_field_fail(r, "fov_x_deg", "only with the model pinhole or fisheye");
     if (kind == LENS_ORTHOGRAPHIC)
         GBT_TRY(json_field_needed(r, "view_width",
                                   "units of the data set from the left edge of the picture to the right"));
     else if (json_field_given(r, "view_width"))
-        return json_field_fail(r, "view_width", "this model has none (wanted it with orthographic)");
+        return json_field_fail(r, "view_width", "only with the model orthographic");
     GBT_TRY(json_field_number(r, "fov_x_deg", 0, false, kind == LENS_FISHEYE ? 360 : 179.9, &fov_deg));
     GBT_TRY(json_field_number(r, "view_width", 0, false, JSON_VALUE_MAX, &view_width));
     const double half_width = 0.5 * camera->width, half_height = 0.5 * camera->height,
@@ -118,7 +118,7 @@ static gbt_status take_shutter(const json_fields *r, const double origin[3], con
     const json_t *end = json_object_get(r->object, "end");
     if (end == NULL)
         return json_field_given(r, "shutter")
-                   ? json_field_fail(r, "end", "missing (a shutter wants the pose at the end of its way)")
+                   ? json_field_fail(r, "end", "missing (a rolling shutter needs the pose at its end)")
                    : GBT_OK;
     if (!json_is_object(end))
         return json_field_fail(r, "end", "wanted an object with origin, target or up");
@@ -142,7 +142,7 @@ static gbt_status take_aperture(const json_fields *r, ray_shot *shot)
     int seed = 0;
     for (int i = 0; i < 3 && !json_field_given(r, "aperture"); i++)
         if (json_field_given(r, dependent[i]))
-            return json_field_fail(r, "aperture", "missing (there is a focus, samples or seed)");
+            return json_field_fail(r, "aperture", "missing (needed with focus, samples or seed)");
     GBT_TRY(json_field_number(r, "aperture", 0, true, JSON_VALUE_MAX, &shot->aperture_radius));
     if (shot->aperture_radius > 0)
         GBT_TRY(json_field_needed(r, "focus", "distance that is sharp, units of the data set"));

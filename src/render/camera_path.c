@@ -164,9 +164,8 @@ gbt_status camera_path_orbit(const gbt_camera *cameras, size_t count, const came
         double at[3], target[3];
         circle_at(&c, shape, angle, at, target);
         if (!gbt_camera_look_at(at, target, c.axis, &camera))
-            status =
-                base_fail(err, GBT_ERR_FORMAT,
-                          "path: the cameras say no way around (wanted them apart from what they look at)");
+            status = base_fail(err, GBT_ERR_FORMAT,
+                               "path: cannot orbit: the cameras are at the point that they look at");
         out->shots[i] = ray_shot_of(&camera);
     }
     mem_free(c.stations);

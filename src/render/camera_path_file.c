@@ -58,7 +58,7 @@ static gbt_status take_camera(const json_fields *root, const json_t *common, siz
     }
     own.object = merged;
     const gbt_status status = json_field_given(&own, "rays")
-                                  ? json_field_fail(&own, "rays", "not in a path (wanted a camera)")
+                                  ? json_field_fail(&own, "rays", "not supported in a path (wanted a camera)")
                                   : camera_file_take(&own, origin, &file);
     *shot = file.shot;
     json_decref(merged);
@@ -82,14 +82,14 @@ static gbt_status check_alike(const json_fields *root, const camera_path *path, 
         if (same_lens && camera->model != first->model)
             return base_fail(
                 root->err, GBT_ERR_FORMAT,
-                "%s: cameras[%zu].model: not that of the first (wanted one lens on a way with \"frames\")",
+                "%s: cameras[%zu].model: not that of the first (wanted one lens in a path with \"frames\")",
                 root->path, i);
     }
     for (size_t i = 0; i < path->count && same_lens; i++)
         if (is_moving(&path->shots[i]))
             return base_fail(
                 root->err, GBT_ERR_FORMAT,
-                "%s: cameras[%zu]: an aperture or a shutter (wanted none on a way with \"frames\")",
+                "%s: cameras[%zu]: an aperture or a shutter (not possible in a path with \"frames\")",
                 root->path, i);
     return GBT_OK;
 }

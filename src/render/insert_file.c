@@ -27,13 +27,13 @@ static gbt_status take_lamp(const json_fields *all, const double origin[3], inse
     GBT_TRY(json_field_number(&r, "ambient", 0, true, 1, &ambient));
     out->ambient = (float)ambient;
     if (json_field_given(&r, "position") == json_field_given(&r, "towards"))
-        return json_field_fail(all, "light", "wanted one of position and towards");
+        return json_field_fail(all, "light", "wanted either position or towards");
     out->lamp = json_field_given(&r, "position") ? INSERT_LAMP_POINT : INSERT_LAMP_DISTANT;
     GBT_TRY(json_field_vector(&r, "position", false, out->lamp_at));
     GBT_TRY(json_field_vector(&r, "towards", false, out->lamp_at));
     GBT_TRY(json_field_number(&r, "radius", 0, true, JSON_VALUE_MAX, &out->lamp_radius));
     if (out->lamp == INSERT_LAMP_DISTANT && json_field_given(&r, "radius"))
-        return json_field_fail(&r, "radius", "a distant lamp has none (wanted it with position)");
+        return json_field_fail(&r, "radius", "only with position (a distant lamp has no radius)");
     if (out->lamp == INSERT_LAMP_DISTANT)
         dvec_normalize(out->lamp_at);
     if (out->lamp == INSERT_LAMP_DISTANT && !(dvec_length(out->lamp_at) > 0.5))
@@ -58,7 +58,7 @@ static gbt_status take_placement(const json_fields *r, const double origin[3], p
     GBT_TRY(json_field_number(r, "angle_deg", -360, true, 360, &angle_deg));
     if (json_field_given(r, "axis") != json_field_given(r, "angle_deg"))
         return json_field_fail(r, json_field_given(r, "axis") ? "angle_deg" : "axis",
-                               "missing (a turn has both)");
+                               "missing (a rotation needs axis and angle_deg)");
     dvec_normalize(axis);
     if (json_field_given(r, "axis") && !(dvec_length(axis) > 0.5))
         return json_field_fail(r, "axis", "is 0 (wanted a direction)");

@@ -106,10 +106,10 @@ static gbt_status check_memory(const render_job *job, const gbt_render_def *def,
     const size_t peak = mem_peak_bytes();
     if (def->memory == 0 || peak <= def->memory || job->run.cells.count > 0)
         return GBT_OK;
-    return base_fail(
-        err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MiB is too little: this took %zu (all is done; a .ply alone is drawn cell by cell)",
-        def->memory >> 20, (peak >> 20) + 1);
+    return base_fail(err, GBT_ERR_NO_MEMORY,
+                     "memory: the limit of %zu MiB was exceeded: this took %zu MiB (the output is complete; "
+                     "only a .ply can be drawn cell by cell)",
+                     def->memory >> 20, (peak >> 20) + 1);
 }
 
 static gbt_status write_one(render_job *job, const ray_shot *shot, const char *out, const char *name,
@@ -227,7 +227,7 @@ static void warn_of_older_frames(size_t count, const char *out, const gbt_render
     const int length = snprintf(path, sizeof path, "%s/frame_%05zu.%s", out, count + 1,
                                 CHOICE_NAME(GBT_PICTURE_FORMAT_NAMES, def->format));
     if (length < (int)sizeof path && file_exists(path))
-        log_warn("%s: frames from %zu on are of an earlier film", out, count + 1);
+        log_warn("%s: frames from %zu on are left over from an earlier film", out, count + 1);
 }
 
 /* Send the frame that process `from` drew last to the first process. */
@@ -300,7 +300,7 @@ static gbt_status render_film(render_job *job, const char *out, const gbt_render
     return status;
 }
 
-static const char insert_is_traced[] = "insert: meshes are traced (wanted the renderer trace)";
+static const char insert_is_traced[] = "insert: only the renderer trace supports this";
 
 /* Choose the renderer for the open model, and check that it can do what was asked for. */
 static gbt_status choose_renderer(render_job *job, const gbt_render_def *def, gbt_error *err)
@@ -314,18 +314,18 @@ static gbt_status choose_renderer(render_job *job, const gbt_render_def *def, gb
     if (def->insert != NULL && *renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
     if (job->outputs != 0 && *renderer != GBT_RENDERER_TRACE)
-        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: these are traced (wanted the renderer trace)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: only the renderer trace supports these");
     return GBT_OK;
 }
 
 static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_error *err)
 {
     if (def->path == NULL && (def->frames != 0 || def->fps != 0 || def->width != 0 || def->height != 0))
-        return base_fail(err, GBT_ERR_ARGUMENT, "frames, fps, width: of a film (wanted a path)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "frames, fps, width: only with a path");
     const bool orbit = def->path != NULL && strcmp(def->path, "orbit") == 0;
     if (!orbit && (def->look_at != NULL || !isnan(def->orbit_radius) || !isnan(def->orbit_height)))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "look_at, orbit_radius, orbit_height: of an orbit (wanted the path orbit)");
+                         "look_at, orbit_radius, orbit_height: only with the path orbit");
     if (def->orbit_radius <= 0 || def->orbit_radius > 1e9)
         return base_fail(err, GBT_ERR_ARGUMENT, "orbit_radius: %g (wanted above 0, up to 1e+09)",
                          def->orbit_radius);
@@ -333,12 +333,12 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
         return base_fail(err, GBT_ERR_ARGUMENT, "orbit_height: %g (wanted -1e+09 to 1e+09)",
                          def->orbit_height);
     if (def->path == NULL)
-        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film wants a path", out) : GBT_OK;
+        return video_named(out) ? base_fail(err, GBT_ERR_ARGUMENT, "%s: a film needs a path", out) : GBT_OK;
     if (def->camera != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "path: not with a camera");
+        return base_fail(err, GBT_ERR_ARGUMENT, "path: cannot be combined with a camera file");
     if (!render_path_wants_views(def->path) && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "downscale: not with a path file (wanted the size of the film)");
+                         "downscale: cannot be combined with a path file (wanted the size of the film)");
     if (def->frames < 0 || def->frames > CAMERA_PATH_FRAMES_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "frames: %d (wanted 1 to %d)", def->frames,
                          (int)CAMERA_PATH_FRAMES_MAX);
@@ -349,9 +349,9 @@ static gbt_status check_path(const char *out, const gbt_render_def *def, gbt_err
         return base_fail(err, GBT_ERR_ARGUMENT, "width: %d x %d (wanted 1 to 65500 pixels)", def->width,
                          def->height);
     if (video_named(out) && def->outputs != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: not with a film (wanted a folder)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "outputs: cannot be written as a film (wanted a folder)");
     if (video_named(out) && def->format != GBT_PICTURE_PNG)
-        return base_fail(err, GBT_ERR_ARGUMENT, "format: not with a film (wanted a folder)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "format: does not apply to a film (wanted a folder)");
     return GBT_OK;
 }
 
@@ -372,10 +372,11 @@ static gbt_status check_def(const char *out, const gbt_render_def *def, gbt_erro
         return base_fail(err, GBT_ERR_ARGUMENT, "downscale: %g (wanted 1 to 64)", def->downscale);
     if (def->camera != NULL && def->downscale != 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "downscale: not with a camera (the camera file says the size)");
+                         "downscale: cannot be combined with a camera file (which gives the size)");
     if (def->data != NULL && !wants_views(def))
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "data: not with a camera or a path file (they are the cameras)");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "data: cannot be combined with a camera file or a path file (which give the cameras)");
     if (def->insert != NULL && def->renderer != GBT_RENDERER_AS_TRAINED &&
         def->renderer != GBT_RENDERER_TRACE)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s", insert_is_traced);
@@ -407,8 +408,8 @@ static gbt_status open_run(const char *run, const char *out, const gbt_render_de
     if (large && (!is_traced || def->insert != NULL || def->outputs != NULL))
         return base_fail(
             err, GBT_ERR_ARGUMENT,
-            "memory: what is larger than it is traced, cell by cell, in colours alone (wanted the renderer "
-            "trace, no outputs, no meshes)");
+            "memory: a model larger than this can only be traced, without outputs and meshes (wanted the "
+            "renderer trace, no outputs, no inserted meshes)");
     if (large)
         GBT_TRY(file_make_folder(folder, err)); /* for the cells' temporary file */
     if (large)

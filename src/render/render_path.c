@@ -125,7 +125,7 @@ static gbt_status resize(camera_path *path, const gbt_render_def *def, gbt_error
         camera_group group = {.lens = shot->camera};
         if (shot->camera.model != GBT_CAMERA_PINHOLE)
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "width: not with a path of %s cameras (its file says the size)",
+                             "width: cannot be combined with a path of %s cameras (its file gives the size)",
                              gbt_camera_model_name(shot->camera.model));
         const gbt_camera lens = camera_group_lens(&group, def->width, def->height);
         shot->camera.width = lens.width;

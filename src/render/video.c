@@ -67,7 +67,7 @@ gbt_status video_check_name(const char *path, gbt_error *err)
     for (size_t i = 0; i < sizeof others / sizeof *others; i++)
         if (file_ends_with(path, others[i]))
             return base_fail(err, GBT_ERR_ARGUMENT,
-                             "%s: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)",
+                             "%s: this type of film cannot be written (wanted .mp4, .webm, .gif or a folder)",
                              path);
     static const char *const pictures[] = {".png", ".jpg", ".jpeg", ".exr"};
     for (size_t i = 0; i < sizeof pictures / sizeof *pictures; i++)
@@ -83,7 +83,7 @@ static gbt_status missing(const video *v, gbt_error *err)
 {
     return base_fail(
         err, GBT_ERR_IO,
-        "%s: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, "
+        "%s: a film needs the program ffmpeg, which is not installed (install it: apt install ffmpeg, "
         "or give a folder for pictures)",
         v->film.name);
 }
@@ -128,9 +128,9 @@ static gbt_status prepare(video *v, const char *path, int width, int height, dou
                          path, width, height);
     struct sigaction now;
     if (sigaction(SIGCHLD, NULL, &now) == 0 && now.sa_handler == SIG_IGN)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%s: SIGCHLD is ignored, so that nobody knows how ffmpeg ends (wanted SIG_DFL)",
-                         path);
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "%s: SIGCHLD is ignored, so the exit status of ffmpeg would be lost (wanted SIG_DFL)", path);
     GBT_TRY(large_file_create(path, &v->film, err));
     v->width = width;
     v->height = height;
@@ -198,7 +198,7 @@ static int finish(video *v)
 
 static gbt_status failed(video *v, int code, gbt_error *err)
 {
-    char line[200], last[200] = "it said nothing";
+    char line[200], last[200] = "no output";
     if (code == NOT_STARTED) /* where posix_spawnp() itself cannot report it */
         return missing(v, err);
     rewind(v->complaints);

@@ -76,12 +76,12 @@ static gbt_status take_camera(const words *w, request *out)
     if (text == NULL)
         return request_check_size(out->width, out->height, w->err);
     if (out->width > 0)
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "width: the camera says its own");
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "width: the camera gives its own");
     ray_shot shot;
     GBT_TRY(camera_text_read(text, "camera", none, &shot, w->err));
     if (shot.aperture_radius > 0 || !camera_is_still(&shot.camera))
         return base_fail(w->err, GBT_ERR_ARGUMENT,
-                         "camera: an open aperture or a rolling shutter is for gbtrace render");
+                         "camera: an open aperture or a rolling shutter needs gbtrace render");
     out->camera = shot.camera;
     return request_check_size(shot.camera.width, shot.camera.height, w->err);
 }
@@ -111,7 +111,7 @@ static gbt_status take_picture(const words *w, request *out)
     if (output != NULL && strcmp(output, "color") != 0)
         GBT_TRY(render_outputs_parse(output, &out->output, w->err));
     if ((out->output & (out->output - 1)) != 0)
-        return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" (wanted one)", output);
+        return base_fail(w->err, GBT_ERR_ARGUMENT, "output: \"%.40s\" (wanted a single output)", output);
     GBT_TRY(take_choice(w, "renderer", GBT_RENDERER_TRAINING_NAMES, &renderer));
     GBT_TRY(take_choice(w, "format", "raw|jpeg|png|float", &format));
     GBT_TRY(take_choice(w, "preset", GBT_PRESET_NAMES, &preset));
@@ -123,7 +123,7 @@ static gbt_status take_picture(const words *w, request *out)
     out->preset = (gbt_preset)preset;
     if (out->output != 0 && (out->renderer != GBT_RENDERER_TRACE || out->format != REQUEST_FLOAT))
         return base_fail(w->err, GBT_ERR_ARGUMENT,
-                         "output: \"%.40s\" is traced, and has the format float alone", output);
+                         "output: \"%.40s\" needs the renderer trace and the format float", output);
     return GBT_OK;
 }
 

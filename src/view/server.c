@@ -251,7 +251,7 @@ static enum MHD_Result begin(server *s, server_job *job, const char *path)
     }
     pthread_mutex_unlock(&s->lock);
     if (!waits)
-        return refuse(s, job->connection, 503, "error: too many requests wait\n");
+        return refuse(s, job->connection, 503, "error: too many requests are waiting\n");
     sem_post(&s->wake);
     return MHD_YES;
 }
@@ -351,7 +351,7 @@ gbt_status server_start(const guard *g, int port, const char *log_path, server *
     *out = NULL;
     return base_fail(err, GBT_ERR_IO, "%s:%d: cannot listen: %s%s", g->host, port,
                      why != 0 ? strerror(why) : "libmicrohttpd did not start",
-                     why == EADDRINUSE ? " (wanted another, or 0 for any free one)" : "");
+                     why == EADDRINUSE ? " (wanted another port, or 0 for any free one)" : "");
 }
 
 int server_port(const server *s) { return MHD_get_daemon_info(s->daemon, MHD_DAEMON_INFO_BIND_PORT)->port; }

@@ -36,7 +36,7 @@ static gbt_status open_run(viewer_state *s, loaded_run *run, char *note, size_t 
     const bool hint = loaded_run_cut_hint(first.text);
     if (run->cloud.count == 0)
         snprintf(note, note_size, "No photos: %.500s%s", first.text,
-                 hint ? "; where it is now can be said when the viewer is started" : "");
+                 hint ? "; to show them, start the viewer with the new place of the data set" : "");
     return GBT_OK;
 }
 
@@ -100,7 +100,7 @@ gbt_status viewer_open(const char *input, const char *data, viewer_state *out, g
         return reopen(out, &file, err);
     if (!folder || !file_exists(config))
         return base_fail(err, GBT_ERR_IO,
-                         "%.1000s: not there (wanted a run, a model file or plain Gaussians)",
+                         "%.1000s: does not exist (wanted a run, a model file or plain Gaussians)",
                          out->model_path);
     snprintf(out->note, sizeof out->note,
              "Training has not saved a model yet; it will be shown as soon as it has.");

@@ -614,16 +614,16 @@ static const struct bad_case {
      ": cameras[0].target: missing (wanted 3 numbers)"},
     {"{" COMMON ", \"fov\": 3, \"cameras\": " TWO "}", ": cameras[0].fov: unknown field"},
     {"{" COMMON ", \"cameras\": [{\"rays\": \"x.exr\"}]}",
-     ": cameras[0].rays: not in a path (wanted a camera)"},
+     ": cameras[0].rays: not supported in a path (wanted a camera)"},
     {"{\"width\": 64, \"up\": [0, 1, 0], \"fov_x_deg\": 90, \"cameras\": [{\"origin\": [0, 0, 0], "
      "\"target\": [0, 0, 1], \"height\": 32}, {\"origin\": [0, 0, 0], \"target\": [0, 0, 1], \"height\": "
      "16}]}",
      ": cameras[1]: 64 x 16 pixels (wanted 64 x 32, as the first)"},
     {"{\"frames\": 9, " COMMON ", \"cameras\": [{\"origin\": [0, 0, 0], \"target\": [0, 0, 1]}, {\"origin\": "
      "[0, 0, 0], \"target\": [0, 0, 1], \"model\": \"fisheye\"}]}",
-     ": cameras[1].model: not that of the first (wanted one lens on a way with \"frames\")"},
+     ": cameras[1].model: not that of the first (wanted one lens in a path with \"frames\")"},
     {"{\"frames\": 9, \"aperture\": 1, \"focus\": 2, " COMMON ", \"cameras\": " TWO "}",
-     ": cameras[0]: an aperture or a shutter (wanted none"},
+     ": cameras[0]: an aperture or a shutter (not possible"},
     {"{\"camera_path\": []}", ": camera_path: wanted a list of 1 to 100000 cameras"},
     {"{\"camera_path\": [{}]}", ": render_width: missing (pixels)"},
     {"{\"render_width\": 8, \"camera_path\": [{}]}", ": render_height: missing (pixels)"},
@@ -695,7 +695,7 @@ static void film_without_ffmpeg(void **state)
     if (status == GBT_OK) /* where posix_spawnp() cannot say so: emulators */
         status = video_close(v, true, &err);
     assert_int_equal(status, GBT_ERR_IO);
-    assert_non_null(strstr(err.text, "a film wants the program ffmpeg, which is not there"));
+    assert_non_null(strstr(err.text, "a film needs the program ffmpeg, which is not installed"));
     no_film_left(path);
     memset(&err, 0, sizeof err);
     assert_int_equal(video_open(path, 15, 16, 30, &v, &err), GBT_ERR_ARGUMENT);

@@ -601,7 +601,7 @@ static void what_cannot_be_shown(void **state)
         int port;
         gbt_status status;
     } rows[] = {{"nowhere", NULL, "nowhere", NULL, 0, GBT_ERR_IO},
-                {"tiny", NULL, "model.gbt: not there", NULL, 0, GBT_ERR_IO},
+                {"tiny", NULL, "model.gbt: does not exist", NULL, 0, GBT_ERR_IO},
                 {"tiny/images", NULL, "model.gbt", NULL, 0, GBT_ERR_IO},
                 {"run/config", NULL, "config", NULL, 0, GBT_ERR_FORMAT},
                 {"run", "nowhere", "nowhere", NULL, 0, GBT_ERR_IO},
@@ -636,7 +636,7 @@ static void a_model_without_its_photos(void **state)
     assert_true(number_of(there, "size") > 0);
     const char *note = json_string_value(json_object_get(status, "note"));
     assert_true(strncmp(note, "No photos: ", 11) == 0 && strstr(note, "`data`") == NULL);
-    assert_non_null(strstr(note, "); where it is now can be said when the viewer is started"));
+    assert_non_null(strstr(note, "); to show them, start the viewer with the new place of the data set"));
     json_decref(there);
     json_decref(status);
     close_viewer(&v, SIGINT);

@@ -281,9 +281,10 @@ gbt_status bake_cloud(frame *f, const anchors *a, const decoder *d, const gbt_ca
                       bake_result *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    if (def->sh_degree < 0 || def->sh_degree > 3 || !(def->prior_weight >= 0 && def->prior_weight <= 1))
-        return base_fail(err, GBT_ERR_ARGUMENT, "bake: degree %d, prior %g (wanted 0 to 3, 0 to 1)",
-                         def->sh_degree, def->prior_weight);
+    if (def->sh_degree < 0 || def->sh_degree > 3)
+        return base_fail(err, GBT_ERR_ARGUMENT, "bake: sh_degree %d (wanted 0 to 3)", def->sh_degree);
+    if (!(def->prior_weight >= 0 && def->prior_weight <= 1))
+        return base_fail(err, GBT_ERR_ARGUMENT, "bake: prior_weight %g (wanted 0 to 1)", def->prior_weight);
     baking b = {.a = a, .functions = sh_count(def->sh_degree)};
     b.sums = mem_calloc(a->count * (size_t)a->offset_count, sizeof *b.sums, "Gaussians to bake", err);
     b.anchor_views = mem_calloc(a->count, sizeof *b.anchor_views, "anchors to bake", err);

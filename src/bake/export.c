@@ -284,15 +284,16 @@ static gbt_status check_places(const char *input, const char *json, const char *
 /* Reject options that have no meaning for plain Gaussians, which are only converted. */
 static gbt_status check_plain(const char *input, const gbt_export_def *def, gbt_error *err)
 {
-    static const char wanted[] = "wanted a trained model";
     const gbt_export_def usual = gbt_export_def_default();
-    if (def->refine_steps != usual.refine_steps)
-        return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d of %s (%s)", def->refine_steps, input,
-                         wanted);
-    if (def->backdrop != usual.backdrop)
-        return base_fail(err, GBT_ERR_ARGUMENT, "backdrop: not for %s (%s)", input, wanted);
-    if (def->data != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT, "data: not for %s (%s)", input, wanted);
+    const char *const field = def->gaussians != 0                       ? "gaussians"
+                              : def->refine_steps != usual.refine_steps ? "refine_steps"
+                              : def->backdrop != usual.backdrop         ? "backdrop"
+                              : def->data != NULL                       ? "data"
+                                                                        : NULL;
+    if (field != NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: does not apply to plain Gaussians, as in %s (wanted a trained model)", field,
+                         input);
     return GBT_OK;
 }
 
@@ -303,9 +304,8 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
         return base_fail(err, GBT_ERR_ARGUMENT, "sh_degree: %d (wanted 0 to 3)", def->sh_degree);
     if (def->refine_steps < 0)
         return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d (wanted 0 or more)", def->refine_steps);
-    if (def->gaussians < 0 || (def->gaussians > 0 && gaussian_file_readable(input)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d of %s (wanted 0 or more, and a trained model)",
-                         def->gaussians, input);
+    if (def->gaussians < 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d (wanted 0 or more)", def->gaussians);
     if (gaussian_file_readable(input))
         GBT_TRY(check_plain(input, def, err));
     if (output_count < 1 || output_count > OUTPUTS_MAX)
@@ -318,7 +318,8 @@ static gbt_status check(const char *input, const gbt_export_def *def, const char
             GBT_TRY(gaussian_file_check_writable(outputs[i], err));
     }
     if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: a result folder is made once, of a run", input);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted a run as input, and one result folder at most",
+                         input);
     return check_places(input, def->json, outputs, output_count, err);
 }
 
@@ -426,9 +427,10 @@ static gbt_status report_all(const exporting *e, const char *input, FILE *report
         if (report != NULL)
             say_file(e, f, report);
         if (f->with_near - f->to_model > near_loss_db)
-            log_warn("%s: the format does not keep the near distance (%.3g), with which the file would be "
-                     "%.2f dB to the model instead of %.2f",
-                     f->path, (double)e->run.settings.t_near, f->with_near, f->to_model);
+            log_warn(
+                "%s: the format does not keep the near distance (%.3g): PSNR to the model is %.2f dB instead "
+                "of %.2f",
+                f->path, (double)e->run.settings.t_near, f->to_model, f->with_near);
     }
     gbt_status status = GBT_OK;
     if (e->def->json != NULL) {
@@ -477,7 +479,7 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
     if (def->lpips != NULL)
         status = e->folder != NULL
                      ? lpips_open(def->lpips, &e->net, err)
-                     : base_fail(err, GBT_ERR_ARGUMENT, "lpips: is for result folders alone (wanted OUT/)");
+                     : base_fail(err, GBT_ERR_ARGUMENT, "lpips: only for result folders (wanted OUT/)");
     if (status == GBT_OK && e->baked)
         status = open_run(e, input, err);
     if (status == GBT_OK && e->folder != NULL)

@@ -125,9 +125,10 @@ gbt_status refine_cloud(frame *teacher, const anchors *a, const decoder *d, cons
                         size_t camera_count, const trace_settings *settings, const refine_def *def,
                         gaussian_cloud *cloud, gbt_error *err)
 {
-    if (def->steps < 0 || camera_count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps, %zu cameras (wanted 0 or more, 1 or more)",
-                         def->steps, camera_count);
+    if (def->steps < 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine: %d steps (wanted 0 or more)", def->steps);
+    if (camera_count == 0)
+        return base_fail(err, GBT_ERR_ARGUMENT, "refine: no cameras (wanted 1 or more)");
     refining r = {.frame.draw.footprint = teacher->draw.footprint};
     gbt_status status = open_state(&r, cloud, err);
     const int pixel_step = teacher->draw.pixel_step;

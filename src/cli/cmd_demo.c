@@ -35,7 +35,7 @@ static const option *options(int *count)
          .kind = OPTION_STRING,
          .value = &out,
          .value_name = "DIR",
-         .help = "folder for the scene and its run, which are made anew; a run of other data is left alone"},
+         .help = "folder for the scene and its run, which are replaced; a run of other data is left alone"},
         {.name = "minutes",
          .kind = OPTION_DOUBLE,
          .value = &minutes,
@@ -87,7 +87,8 @@ static int run(const operands *given)
     char about[4200];
     snprintf(about, sizeof about, "%s/SCENE.md", data);
     if (access(data, F_OK) == 0 && access(about, F_OK) != 0)
-        return command_misused("%s: is there, and is no scene of gbtrace's (wanted another --output)", data);
+        return command_misused("%s: exists, but is not a scene made by gbtrace (choose another --output)",
+                               data);
     train.budget_seconds = 60 * minutes;
     train.command = command_line;
     train.overwrite = is_of_scene(run_folder);

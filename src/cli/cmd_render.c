@@ -51,7 +51,7 @@ static const option *options(int *count)
          .fixed = "train",
          .help = "the same as --split train",
          .rare = true},
-        {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps its last model alone"},
+        {.name = "iteration", .kind = OPTION_ELSEWHERE, .help = "a run keeps only its last model"},
         {.name = "camera",
          .kind = OPTION_STRING,
          .value = &def.camera,
@@ -140,7 +140,7 @@ static const option *options(int *count)
          .min = 0,
          .max = 0x1p60,
          .value_name = "BYTES",
-         .help = "memory to take at most, such as 2G: a .ply that is larger is drawn cell by cell "
+         .help = "upper limit for memory, such as 2G: a .ply that is larger is drawn cell by cell "
                  "(docs/memory.md); default: no limit"},
         {.name = "format",
          .kind = OPTION_CHOICE,
@@ -176,7 +176,7 @@ static int run(const operands *given)
         if (def.camera == NULL && !draws_as_the_run())
             return command_misused(
                 "--output is missing (with --data, --downscale, --format, --insert, --path, "
-                "--preset or --renderer nothing goes into %s/renders)",
+                "--preset or --renderer, pictures do not go into %s/renders)",
                 given->value[0]);
         if (snprintf(folder, sizeof folder, "%s/renders%s%s", given->value[0], def.camera == NULL ? "/" : "",
                      def.camera == NULL ? split_names[def.split] : "") >= (int)sizeof folder)

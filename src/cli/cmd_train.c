@@ -56,7 +56,7 @@ static int run(const operands *given)
                                command_train.usage);
     const bool by_count = options_typed(&def.iterations), by_time = options_typed(&def.budget_seconds);
     if (by_count && by_time && def.iterations > 0 && def.budget_seconds > 0)
-        return command_misused("--budget: not with --iterations");
+        return command_misused("--budget: cannot be combined with --iterations");
     /* A length of training set in a configuration file or variable is meant for runs in general: it does not
      * apply to a resumed run, and a length on the command line replaces it. */
     if ((def.resume || by_time) && !by_count)

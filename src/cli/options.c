@@ -22,7 +22,8 @@ gbt_status options_memory_kept(size_t limit, gbt_error *err)
     if (limit == 0 || peak <= limit)
         return GBT_OK;
     err->status = GBT_ERR_NO_MEMORY;
-    snprintf(err->text, sizeof err->text, "memory: %zu MiB is too little: this took %zu (all is done)",
+    snprintf(err->text, sizeof err->text,
+             "memory: the limit of %zu MiB was exceeded: this took %zu MiB (the output is complete)",
              limit >> 20, (peak >> 20) + 1);
     return err->status;
 }
@@ -43,7 +44,7 @@ void options_table(const command *self, option_table *t)
          .min = 0,
          .max = 1024,
          .value_name = "T",
-         .help = "threads; 0: all processors, within the container's limit"},
+         .help = "number of threads; 0: all processors, within the container's limit"},
         {.name = "progress",
          .kind = OPTION_CHOICE,
          .value = &wanted_progress,
@@ -59,16 +60,16 @@ void options_table(const command *self, option_table *t)
          .kind = OPTION_STRING,
          .value = &config_path,
          .value_name = "FILE",
-         .help = "read name = value lines; environment and command line override them"},
+         .help = "read options as name = value lines; environment and command line override them"},
         {.name = "help",
          .short_name = 'h',
          .kind = OPTION_FLAG,
          .value = &help_wanted,
-         .help = "the options that most people need"},
+         .help = "list the options that most people need"},
         {.name = "help-all",
          .kind = OPTION_FLAG,
          .value = &help_wanted,
-         .help = "all options, and other names"},
+         .help = "list all options, with their other names"},
     };
     int own = 0;
     const option *rows = self->options != NULL ? self->options(&own) : NULL;
@@ -144,7 +145,7 @@ static int apply(const argument *a, const option *o, int argc, char **argv, int 
 {
     char wanted[OPTIONS_WANTED_SIZE], what[2 * OPTIONS_WANTED_SIZE];
     if (o->kind == OPTION_ELSEWHERE)
-        return command_misused("%s: not here; %s", a->label, o->help);
+        return command_misused("%s: not supported; %s", a->label, o->help);
     if (!options_takes_value(o)) {
         if (a->value != NULL)
             return command_misused("%s: takes no value (got %.80s)", a->label, a->value);
@@ -192,7 +193,7 @@ static int walk(const option_table *t, bool common, int argc, char **argv, bool 
                 return command_misused("%s: given twice", a.label);
             for (int k = 0; k < t->count; k++)
                 if (given[k] && o->value != NULL && t->rows[k].value == o->value)
-                    return command_misused("%s: not with --%s", a.label, t->rows[k].name);
+                    return command_misused("%s: cannot be combined with --%s", a.label, t->rows[k].name);
             given[a.index] = true;
             const int applied = apply(&a, o, argc, argv, &i);
             if (applied != GO_ON)
@@ -244,8 +245,8 @@ static int check_belongs(const command *self, const option_table *t, const bool 
     for (int i = 0; i < t->own && out->count > 0; i++) {
         const option *o = &t->rows[i];
         if (typed[i] && o->of != NULL && !options_has_word(o->of, out->value[0], strlen(out->value[0])))
-            return command_misused("--%s: not of %s %.60s (of %s)", o->name, self->name, out->value[0],
-                                   o->of);
+            return command_misused("--%s: does not apply to %s %.60s (only to %s)", o->name, self->name,
+                                   out->value[0], o->of);
     }
     return GO_ON;
 }

@@ -23,7 +23,7 @@ static const option elsewhere[] = {
      .help = "use --alpha white (the default of Blender's scenes)"},
     {.name = "random-background",
      .kind = OPTION_ELSEWHERE,
-     .help = "half of the steps from the middle of a run have one; leave it out"},
+     .help = "from the middle of a run on, half of the steps use one already; leave it out"},
     {.name = "sh-degree",
      .kind = OPTION_ELSEWHERE,
      .help = "colours come from networks; gbtrace export has --sh-degree"},
@@ -43,7 +43,7 @@ static const option elsewhere[] = {
      .kind = OPTION_ELSEWHERE,
      .aliases = "port disable-viewer",
      .help = "gbtrace view RUN shows a run while it trains"},
-    {.name = "lambda-dssim", .kind = OPTION_ELSEWHERE, .help = "it is 0.2; leave it out"},
+    {.name = "lambda-dssim", .kind = OPTION_ELSEWHERE, .help = "it is always 0.2; leave it out"},
     {.name = "densify-until-iter",
      .kind = OPTION_ELSEWHERE,
      .aliases = "update-until densify-from-iter start-stat update-from",
@@ -78,7 +78,7 @@ static const option elsewhere[] = {
     {.name = "use-feat-bank",
      .kind = OPTION_ELSEWHERE,
      .aliases = "feat-dim lod warmup ratio undistorted",
-     .help = "there is nothing like it; leave it out"},
+     .help = "gbtrace has nothing like it; leave it out"},
 };
 
 enum { ELSEWHERE_COUNT = sizeof elsewhere / sizeof *elsewhere, NAME_SIZE = 32 };
@@ -174,7 +174,7 @@ static gbt_status read_times(const char *eval_at, gbt_train_def *def, gbt_error 
         if (!options_read_value(&one, item, wanted, sizeof wanted) || seconds <= previous ||
             def->eval_at_count == GBT_TRAIN_MAX_EVALS) {
             snprintf(err->text, sizeof err->text,
-                     "--eval-at: \"%.80s\" (wanted up to %d rising times, such as 1m,2m)", item,
+                     "--eval-at: \"%.80s\" (wanted up to %d increasing times, such as 1m,2m)", item,
                      GBT_TRAIN_MAX_EVALS);
             return GBT_ERR_ARGUMENT;
         }

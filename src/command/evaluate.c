@@ -131,13 +131,12 @@ gbt_status gbt_evaluate(const char *run, const gbt_evaluate_def *def, gbt_error 
     if (status == GBT_OK)
         log_scores(&e);
     if (status == GBT_OK && !own && def->json != NULL)
-        log_info(
-            "other settings than the run's own: these scores are in %s; %s/metrics.json and report.html stay",
-            def->json, run);
+        log_info("other settings than the run's own: scores are only in %s; %s/metrics.json and report.html "
+                 "are unchanged",
+                 def->json, run);
     else if (status == GBT_OK && !own)
-        log_info("other settings than the run's own: %s/metrics.json and report.html stay; a JSON file that "
-                 "is named "
-                 "keeps these scores",
+        log_info("other settings than the run's own: %s/metrics.json and report.html are unchanged; name a "
+                 "JSON file to keep these scores",
                  run);
     lpips_close(net);
     mem_free(e.views);

@@ -58,8 +58,8 @@ static gbt_status find_downscale(const result_folder *from, const char *data, do
         return GBT_OK;
     if (scene_load(data, NULL, &s, &why) != GBT_OK) {
         if (from->width > 0)
-            log_warn("trained on photos %d pixels wide, and the data set cannot be read: tell eval the "
-                     "downscale (%s)",
+            log_warn("trained on photos %d pixels wide, and the data set cannot be read: set the "
+                     "downscale when you run gbtrace eval (%s)",
                      from->width, why.text);
         return GBT_OK;
     }
@@ -105,7 +105,7 @@ static gbt_status check_places(const char *run, const gbt_import_def *def, gbt_e
     }
     return def->data == NULL || file_exists(def->data)
                ? GBT_OK
-               : base_fail(err, GBT_ERR_IO, "%.1000s: the data set is not there", def->data);
+               : base_fail(err, GBT_ERR_IO, "%.1000s: the data set does not exist", def->data);
 }
 
 static gbt_status write_run(const model *m, const char *run, gbt_error *err)

@@ -120,9 +120,9 @@ gbt_status gaussian_file_read(const char *given, gaussian_cloud *out, gbt_error 
 gbt_status gaussian_file_check_writable(const char *path, gbt_error *err)
 {
     char all[LIST_SIZE];
-    return format_of(path) != NULL
-               ? GBT_OK
-               : base_fail(err, GBT_ERR_ARGUMENT, "%s: which format? (wanted %s)", path, list(" or ", all));
+    return format_of(path) != NULL ? GBT_OK
+                                   : base_fail(err, GBT_ERR_ARGUMENT, "%s: unknown file ending (wanted %s)",
+                                               path, list(" or ", all));
 }
 
 int gaussian_file_degree(const char *path)

@@ -124,7 +124,7 @@ gbt_status gbt_model_set_gaussians(gbt_model *m, const gbt_gaussians *g, gbt_err
     PLAIN_NUMBERS;
     if (m->run.cloud.count == 0 && m->run.model.anchors.count > 0)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "model: networks make its Gaussians (wanted a model of plain ones)");
+                         "model: its Gaussians are decoded by networks (wanted a model of plain Gaussians)");
     GBT_TRY(check(g, err));
     gaussian_cloud cloud = {0};
     GBT_TRY(gaussian_cloud_alloc(&cloud, g->count, err));
@@ -162,9 +162,9 @@ gbt_status gbt_model_get_gaussians(const gbt_model *m, float *mean, float *scale
     const gaussian_cloud *c = &m->run.cloud;
     const size_t n = c->count, width = 3 * (size_t)((c->sh_degree + 1) * (c->sh_degree + 1));
     if (n == 0)
-        return base_fail(
-            err, GBT_ERR_ARGUMENT,
-            "model: networks make its Gaussians for each view (wanted plain ones: export it first)");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "model: its Gaussians are decoded by networks for each view (wanted plain "
+                         "Gaussians: export it first)");
     for (size_t i = 0; i < 3 * n && mean != NULL; i++)
         mean[i] = (float)((double)c->mean[i] + m->run.model.origin[i % 3]);
     copy_floats(c->scale_log, 3 * n, scale_log);
@@ -250,7 +250,7 @@ gbt_status gbt_model_open_views(gbt_model *m, const char *data, size_t *count, g
     *count = 0;
     loaded_run_close_views(&m->run);
     if (data == NULL && m->path[0] == '\0')
-        return base_fail(err, GBT_ERR_ARGUMENT, "model: Gaussians of arrays know no cameras (wanted `data`)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "model: made from arrays, it has no cameras (wanted `data`)");
     GBT_TRY(loaded_run_open_views(m->path, data, 0, &m->run, err));
     *count = m->run.scene.view_count;
     return GBT_OK;

@@ -90,8 +90,9 @@ gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6]
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "gradient: no render is kept (wanted gbt_model_render() with keep before each)");
     if (d_gaussians != NULL && m->run.cloud.count == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "gradient: networks make this model's Gaussians (wanted a model of plain ones)");
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "gradient: this model's Gaussians are decoded by networks (wanted a model of plain Gaussians)");
     const size_t values = 3 * ray_image_count(&f->rays);
     for (size_t i = 0; i < values; i++)
         if (!isfinite(d_rgb[i]))

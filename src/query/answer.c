@@ -19,8 +19,8 @@ static gbt_status check(const gbt_query_def *def, gbt_error *err)
     if ((unsigned)def->kind > GBT_QUERY_CROSSED)
         return base_fail(err, GBT_ERR_ARGUMENT, "kind: %d", (int)def->kind);
     if ((def->at == NULL) == (def->from == NULL))
-        return base_fail(err, GBT_ERR_ARGUMENT, "at, from: %s (wanted one of them)",
-                         def->at == NULL ? "neither" : "both");
+        return base_fail(err, GBT_ERR_ARGUMENT, "at, from: %s given (wanted exactly one of them)",
+                         def->at == NULL ? "neither is" : "both are");
     if (def->k < 1 || def->k > 1000000)
         return base_fail(err, GBT_ERR_ARGUMENT, "k: %d (wanted 1 to 1000000)", def->k);
     if (!(def->radius >= 0))
@@ -38,9 +38,11 @@ static gbt_status read_queries(const gbt_query_def *def, query_rows *rows, gbt_e
     else
         GBT_TRY(query_rows_read(def->from, least, most, rows, err));
     if (rows->count == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%.400s: no queries", def->at != NULL ? "at" : def->from);
+        return base_fail(err, GBT_ERR_FORMAT, "%.400s: holds no query points",
+                         def->at != NULL ? "at" : def->from);
     if (rows->width == 7)
-        return base_fail(err, GBT_ERR_FORMAT, "%.400s: 7 numbers (wanted 6, or 8 with t_min and t_max)",
+        return base_fail(err, GBT_ERR_FORMAT,
+                         "%.400s: 7 numbers for a ray (wanted 6, or 8 with t_min and t_max)",
                          def->at != NULL ? "at" : def->from);
     return GBT_OK;
 }

@@ -60,8 +60,8 @@ static gbt_status bad_width(const char *name, size_t line, size_t count, size_t 
     return least == most ? base_fail(err, GBT_ERR_FORMAT, "%.400s:%zu: %zu numbers (wanted %zu)", name, line,
                                      count, least)
                          : base_fail(err, GBT_ERR_FORMAT,
-                                     "%.400s:%zu: %zu numbers (wanted %zu to %zu, in all rows alike)", name,
-                                     line, count, least, most);
+                                     "%.400s:%zu: %zu numbers (wanted %zu to %zu, the same in all rows)",
+                                     name, line, count, least, most);
 }
 
 gbt_status query_rows_parse(const char *name, const char *text, size_t size, size_t least, size_t most,

@@ -143,7 +143,7 @@ static gbt_status read_model(const char *run, loaded_run *out, gbt_error *err)
         return base_fail(err, GBT_ERR_ARGUMENT, "%.200s...: path is too long", run);
     if (folder && !file_exists(path))
         return base_fail(err, GBT_ERR_IO,
-                         "%.1000s: not there (wanted a run, a model file or plain Gaussians)", path);
+                         "%.1000s: does not exist (wanted a run, a model file or plain Gaussians)", path);
     GBT_TRY(model_load(path, &out->model, err));
     out->def = gbt_train_def_default();
     out->def.footprint = 0; /* default for models that do not store it */
@@ -190,7 +190,7 @@ static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
     r->poses_refined = file_exists(path);
     if (r->poses_refined)
         return pose_file_read(path, &r->scene, &r->held_out_aligned, err);
-    log_warn("%s is not there: photos have the poses of the data set, not those that training found", path);
+    log_warn("%s is missing: photos have the poses of the data set, not those found in training", path);
     return GBT_OK;
 }
 
@@ -219,13 +219,12 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     }
     if (data == NULL && is_plain(out) && !has_data)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: plain Gaussians know no cameras (wanted `camera` or `data`)", run);
+                         "%.1000s: plain Gaussians have no cameras (wanted `camera` or `data`)", run);
     if (data == NULL && !has_data && out->data.tried[0] == '\0')
-        return base_fail(err, GBT_ERR_IO, "%.1000s: the model names no data set; `data` says where it is",
-                         run);
+        return base_fail(err, GBT_ERR_IO, "%.1000s: the model names no data set; `data` must name it", run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
-                         "%.300s: its data set is not there (tried %.1200s); `data` says where it is now",
+                         "%.300s: its data set is not found (tried %.1200s); `data` must name its new place",
                          run, out->data.tried);
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);

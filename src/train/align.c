@@ -58,8 +58,9 @@ static gbt_status align_view(trainer *t, step_view *v, size_t view, gbt_error *e
     *pose = t->poses.given[view];
     for (int i = 0, before = -1; i < STEPS; i++) {
         if (stop_signal_seen())
-            return base_fail(err, GBT_ERR_INTERRUPTED,
-                             "stopped while held-out photos were aligned; the run is saved (resume goes on)");
+            return base_fail(
+                err, GBT_ERR_INTERRUPTED,
+                "stopped while held-out photos were aligned; the run is saved (resume continues)");
         const int level = finest + levels - 1 - i * levels / STEPS;
         const gbt_camera camera = photos_camera(&t->photos, view, level);
         double gradient[POSE_NUMBERS], motion[POSE_NUMBERS];

@@ -31,11 +31,11 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
                          GBT_TRAIN_MAX_EVALS);
     for (int i = 1; i < d->eval_at_count; i++)
         if (!(d->eval_at_seconds[i] > d->eval_at_seconds[i - 1]))
-            return base_fail(err, GBT_ERR_ARGUMENT, "eval_at: %g s after %g s (wanted rising times)",
+            return base_fail(err, GBT_ERR_ARGUMENT, "eval_at: %g s after %g s (wanted increasing times)",
                              d->eval_at_seconds[i], d->eval_at_seconds[i - 1]);
     if (d->resume && d->overwrite)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "overwrite: would lose the run that resume goes on with (wanted one of them)");
+                         "overwrite: would delete the run that resume continues (wanted one of the two)");
     return GBT_OK;
 }
 
@@ -79,5 +79,5 @@ void train_def_warn_unused(const gbt_train_def *d)
             snprintf(names + strlen(names), sizeof names - strlen(names), "%s%s",
                      names[0] != '\0' ? ", " : "", own[i].name);
     if (names[0] != '\0')
-        log_warn("%s: not used with compat", names);
+        log_warn("%s: ignored with compat", names);
 }

@@ -25,7 +25,8 @@ gbt_status resume_mend(const char *latest, const char *previous, gbt_error *err)
         return GBT_OK; /* resume_open() reports the error, if there is one */
     log_warn("%s; going on from %s", why.text, previous);
     if (rename(previous, latest) != 0)
-        return base_fail(err, GBT_ERR_IO, "%s: cannot be named %s: %s", previous, latest, strerror(errno));
+        return base_fail(err, GBT_ERR_IO, "%s: cannot be renamed to %s: %s", previous, latest,
+                         strerror(errno));
     return GBT_OK;
 }
 
@@ -60,8 +61,8 @@ static gbt_status open_data(trainer *t, const char *data, const char *run, const
         run_data_find(run, named, &own);
         if (own.place[0] == '\0')
             return base_fail(err, GBT_ERR_IO,
-                             "%.1000s: its data set is at none of %.2000s (name the folder where it is now)",
-                             run, own.tried);
+                             "%.1000s: its data set is not found (tried %.2000s; give its new folder)", run,
+                             own.tried);
         data = file_is_same(named, own.place) ? named : own.place;
     }
     return trainer_open(t, data, def, err);
@@ -100,9 +101,9 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
         own->iterations = asked->iterations;
         own->pace = NULL;
         change_pace(t, pace_of_iterations(own->iterations));
-        log_info(
-            "%s: %llu steps done; training goes on to step %llu, with the schedules of a run of that length",
-            run, (unsigned long long)t->step, (unsigned long long)own->iterations);
+        log_info("%s: %llu steps done; training continues to step %llu, with the schedules of a run of that "
+                 "length",
+                 run, (unsigned long long)t->step, (unsigned long long)own->iterations);
     } else if (asked->iterations == 0 && asked->budget_seconds > 0 &&
                (asked->pace == NULL || own->pace == NULL) &&
                !(by_time && asked->budget_seconds == own->budget_seconds)) {
@@ -116,10 +117,10 @@ static gbt_status change_length(trainer *t, const char *run, const gbt_train_def
         own->pace = NULL;
         change_pace(t, pace_of_time_spent(t, own->budget_seconds));
         log_info(
-            "%s: %.1f s of training done; it goes on to %g s, with the schedules of a run of that length",
+            "%s: %.1f s of training done; it continues to %g s, with the schedules of a run of that length",
             run, t->seconds, own->budget_seconds);
     } else if (t->pace.known == PACE_SEGMENTS && t->step >= pace_total(&t->pace)) {
-        log_info("%s: all %llu steps are done; with more iterations, or more time, training goes on", run,
+        log_info("%s: all %llu steps are done; with more iterations, or more time, training continues", run,
                  (unsigned long long)t->step);
     }
     return GBT_OK;

@@ -78,12 +78,12 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
         GBT_TRY(file_look(held[i], &kinds[i], err));
     const bool has_checkpoint = kinds[0] != FILE_NONE || kinds[1] != FILE_NONE;
     if (def->resume && !has_checkpoint)
-        return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to go on with (there is no %.1000s)", run,
+        return base_fail(err, GBT_ERR_IO, "%.1000s: holds no run to resume (there is no %.1000s)", run,
                          p->checkpoint);
     if (!def->resume && !def->overwrite && (kinds[2] != FILE_NONE || has_checkpoint))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%.1000s: holds a run already (go on with it by `resume`, name another folder, or "
-                         "lose it by `overwrite`)",
+                         "%.1000s: already holds a run (continue it with `resume`, replace it with "
+                         "`overwrite`, or choose another folder)",
                          run);
     GBT_TRY(file_make_folder(checkpoints, err));
     GBT_TRY(file_check_folder_creatable(run, err));
@@ -129,8 +129,7 @@ static run_clock clock_start(const trainer *t, const run_log *log, save_in_backg
     while (c.next_eval < t->def.eval_at_count && at[c.next_eval] <= t->seconds)
         c.next_eval++;
     if (c.next_eval > 0 && t->step == 0)
-        log_warn("eval_at: before the first step, which came after %.1f s, nothing can be scored: times left "
-                 "out: %d",
+        log_warn("eval_at: nothing can be scored before the first step, at %.1f s; times skipped: %d",
                  t->seconds, c.next_eval);
     else if (c.next_eval > 0 && at[c.next_eval - 1] > scored)
         c.next_eval--; /* a signal came before or during that evaluation */
@@ -146,7 +145,7 @@ static gbt_status check_memory(trainer *t, const run_paths *paths, gbt_error *er
     GBT_TRY(save_surely(t, paths, err));
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MiB is too little: %zu anchors and a view of them took %zu after step %llu; saved in %s",
+        "memory: %zu MiB is too little: %zu anchors and a view needed %zu MiB at step %llu; saved in %s",
         t->def.memory >> 20, t->anchors.count, (peak >> 20) + 1, (unsigned long long)t->step,
         paths->checkpoint);
 }
@@ -211,7 +210,7 @@ static gbt_status follow_step(trainer *t, const step_report *report, run_clock *
         c->last_save = t->seconds;
         if (stop)
             return base_fail(err, GBT_ERR_INTERRUPTED,
-                             "stopped after step %llu; saved in %s (resume goes on)",
+                             "stopped after step %llu; saved in %s (resume continues)",
                              (unsigned long long)t->step, paths->checkpoint);
     }
     return GBT_OK;
@@ -260,8 +259,8 @@ static gbt_status open_trainer(trainer *t, const char *data, const char *run, co
         return GBT_OK;
     t->seconds = clock_wall() - begin; /* loading counts */
     if (t->pace.known < PACE_SEGMENTS && t->seconds > t->def.budget_seconds / 2)
-        log_warn("budget: reading the data took %.3g of %.3g s (wanted at least %.3g)", t->seconds,
-                 t->def.budget_seconds, 2 * t->seconds);
+        log_warn("budget: reading the data took %.3g of %.3g s (wanted a budget of at least %.3g s)",
+                 t->seconds, t->def.budget_seconds, 2 * t->seconds);
     return GBT_OK;
 }
 
@@ -278,11 +277,11 @@ static gbt_status check_same_start(const trainer *t, gbt_error *err)
     const char *other = checkpoint_data_difference(own.data, first.data);
     gbt_status status = GBT_OK;
     if (other != NULL)
-        status = base_fail(err, GBT_ERR_FORMAT, "process %d reads other data (%.1000s has %s)",
+        status = base_fail(err, GBT_ERR_FORMAT, "process %d reads other data than process 0 (%.1000s has %s)",
                            gbt_cluster_rank(), t->scene.folder, other);
     else if (own.step != first.step || own.anchors != first.anchors || own.round_step != first.round_step)
         status = base_fail(err, GBT_ERR_FORMAT,
-                           "process %d goes on from another checkpoint (step %llu with %llu anchors, not "
+                           "process %d resumes from another checkpoint (step %llu with %llu anchors, not "
                            "%llu with %llu)",
                            gbt_cluster_rank(), (unsigned long long)own.step, (unsigned long long)own.anchors,
                            (unsigned long long)first.step, (unsigned long long)first.anchors);
@@ -317,7 +316,7 @@ static gbt_status finish(trainer *t, const run_paths *paths, save_in_background 
     }
     return stop_signal_seen()
                ? base_fail(err, GBT_ERR_INTERRUPTED,
-                           "stopped after the last step; saved in %s (resume goes on)", paths->checkpoint)
+                           "stopped after the last step; saved in %s (resume continues)", paths->checkpoint)
                : GBT_OK;
 }
 

@@ -322,8 +322,8 @@ static double try_distances(seeding *s, double scale)
         distance = (double)depth[count / 2];
     }
     if (most < TRIED / 100)
-        log_warn("the photos look in parallel or outwards, and few places of them agree: how far the scene "
-                 "is is not known (wanted sparse points)");
+        log_warn("the photos look in parallel or outwards, and few of their places match: the distance of "
+                 "the scene is unknown (sparse points would tell it)");
     return distance;
 }
 

@@ -120,9 +120,10 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
                          &t->anchors, NULL, err));
     t->anchors_initial = t->anchors.count;
     if (t->anchors.count > t->def.max_anchors)
-        log_warn("max_anchors: the sparse points make %zu anchors, and so none is added to them (wanted at "
-                 "most %llu)",
-                 t->anchors.count, (unsigned long long)t->def.max_anchors);
+        log_warn(
+            "max_anchors: the sparse points alone make %zu anchors, so none is added in training (the limit "
+            "is %llu)",
+            t->anchors.count, (unsigned long long)t->def.max_anchors);
     return t->rules.features_from_colors && points->has_color ? start_features(t, err) : GBT_OK;
 }
 
@@ -205,7 +206,8 @@ static void choose_background(trainer *t)
         t->rules.opaque_from = HUGE_VAL;
     else if (wants_sky)
         log_warn("%s: no sky is learned: %s", t->scene.folder,
-                 given ? "photos with an alpha channel lie on one colour" : "compat has one colour");
+                 given ? "photos with an alpha channel are composited on one colour"
+                       : "compat uses one colour");
 }
 
 /* Set the length of the run; with a budget it is decided during the run. A resumed run already has its
@@ -220,10 +222,10 @@ static gbt_status take_length(trainer *t, gbt_error *err)
     }
     GBT_TRY(pace_parse(def->pace, &t->pace, err));
     if (pace_total(&t->pace) == 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "pace: no step in all (wanted at least one)");
+        return base_fail(err, GBT_ERR_ARGUMENT, "pace: adds up to no step (wanted at least one)");
     if (!def->resume && def->iterations > 0 && def->iterations != pace_total(&t->pace))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "iterations: %llu (wanted the %llu of `pace` in all, or only one of the two)",
+                         "iterations: %llu, but `pace` adds up to %llu (wanted only one of the two)",
                          (unsigned long long)def->iterations, (unsigned long long)pace_total(&t->pace));
     pace_text(&t->pace, t->pace_words);
     def->pace = t->pace_words;
@@ -240,9 +242,10 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(config_check(&t->def, data, err));
     t->rules = train_rules_of(&t->def);
     if (t->def.views % gbt_cluster_size() != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "views: %d a step, for %d processes (wanted a number of processes that divides it)",
-                         t->def.views, gbt_cluster_size());
+        return base_fail(
+            err, GBT_ERR_ARGUMENT,
+            "views: %d per step cannot be shared by %d processes (wanted a number that divides it)",
+            t->def.views, gbt_cluster_size());
     GBT_TRY(setup_data(t, data, err));
     GBT_TRY(make_anchors(t, err));
     GBT_TRY(make_decoder(t, err));

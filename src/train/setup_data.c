@@ -65,10 +65,9 @@ static gbt_status provide_points(trainer *t, gbt_error *err)
     if (!blind && !few)
         return GBT_OK;
     if (blind && points->count > 0)
-        log_warn(
-            "%s: most training photos see no sparse point, and none is used: are points and poses in one "
-            "coordinate system?",
-            t->scene.folder);
+        log_warn("%s: most training photos see no sparse point, so none is used: are points and poses in the "
+                 "same coordinate system?",
+                 t->scene.folder);
     if (blind)
         GBT_TRY(scene_forget_points(&t->scene, t->rules.recentres, err));
     gbt_error why = {0};
@@ -120,8 +119,8 @@ static gbt_status choose_downscale(trainer *t, gbt_error *err)
     GBT_TRY(photos_usual_downscale(&t->scene, t->rules.limits_width, &t->def.downscale, err));
     if (t->def.downscale > 1)
         log_info(
-            "%s: photos are trained on %.0f pixels wide, the %d of their cameras divided by %.4g (downscale "
-            "says otherwise)",
+            "%s: photos are reduced to %.0f pixels in width, the %d of their cameras divided by %.4g (set "
+            "downscale to change this)",
             t->scene.folder, t->scene.views[t->train_views[0]].camera.width / t->def.downscale,
             t->scene.views[t->train_views[0]].camera.width, t->def.downscale);
     return GBT_OK;
@@ -135,8 +134,8 @@ static gbt_status check_memory(const trainer *t, gbt_error *err)
         return GBT_OK;
     return base_fail(
         err, GBT_ERR_NO_MEMORY,
-        "memory: %zu MiB is too little: %zu points and photos of %d x %d take about %.0f, or %.0f "
-        "without a limit",
+        "memory: %zu MiB is too little: %zu points and photos of %d x %d need about %.0f MiB, or "
+        "%.0f MiB without a limit",
         t->def.memory >> 20, t->scene.points.count, t->scene.views[0].camera.width,
         t->scene.views[0].camera.height, ceil(need.least / 0x1p20), ceil(need.whole / 0x1p20));
 }
@@ -148,11 +147,10 @@ static gbt_status need_valid_pixels(trainer *t, gbt_error *err)
     GBT_TRY(photos_any_valid(&t->photos, t->train_views, t->train_count, &any, err));
     if (any)
         return GBT_OK;
-    return base_fail(
-        err, GBT_ERR_FORMAT,
-        "%s: masks or alpha channels leave no pixel of any photo to train on (wanted light where "
-        "a photo counts)",
-        t->scene.folder);
+    return base_fail(err, GBT_ERR_FORMAT,
+                     "%s: masks or alpha channels leave no pixel of any photo to train on (wanted masks "
+                     "that are white where a photo counts)",
+                     t->scene.folder);
 }
 
 /* Held-out photos are only read after the last step, to score them; unreadable ones are reported now.

@@ -43,7 +43,7 @@ static gbt_status skip_step(trainer *t, step_report *out, const char *what, gbt_
     out->skipped = true;
     t->skipped_steps++;
     if (++t->skipped_in_row >= MAX_SKIPPED_IN_ROW) {
-        base_fail(err, GBT_ERR_FORMAT, "train: %d steps in a row taught nothing, last step %llu: %s",
+        base_fail(err, GBT_ERR_FORMAT, "train: %d steps in a row were skipped, the last is step %llu: %s",
                   MAX_SKIPPED_IN_ROW, (unsigned long long)t->step, what);
         return cluster_agree(GBT_ERR_FORMAT, err);
     }

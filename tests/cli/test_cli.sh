@@ -155,17 +155,17 @@ misuse 4 "nothing: no such file or folder" train --source_path nothing --model_p
 misuse 2 "--output: given twice" train -s nothing -m run --output run
 misuse 4 "nothing: no such file or folder" train nothing -o run --budget 10min
 misuse 2 "-r: bad value (wanted a number from 0 to 64, got 800)" train -s nothing -m run -r 800
-misuse 2 "--budget: not with --iterations" train nothing -o run --iterations 20 --budget 3s
-misuse 2 "--white_background: not here; use --alpha white (the default of Blender's scenes)" train -s d -m r --white_background
-misuse 2 "-i: not here; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4
-misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
-misuse 2 "--test_iterations: not here; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations -1
-misuse 2 "--position_lr_init: not here; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
+misuse 2 "--budget: cannot be combined with --iterations" train nothing -o run --iterations 20 --budget 3s
+misuse 2 "--white_background: not supported; use --alpha white (the default of Blender's scenes)" train -s d -m r --white_background
+misuse 2 "-i: not supported; photos are found from the cameras; for smaller ones use --downscale F" train -s d -m r -i images_4
+misuse 2 "--test_iterations: not supported; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations 7000 30000
+misuse 2 "--test_iterations: not supported; use --eval-at 1m,2m for scores on the way" train -s d -m r --test_iterations -1
+misuse 2 "--position_lr_init: not supported; use --learning-rate F, which multiplies all rates" train -s d -m r --position_lr_init 0.0001
 for name in random_background position_lr_delay_mult exposure_lr_init offset_lr_max_steps mlp_opacity_lr_init appearance_lr_final optimizer_type \
     convert_SHs_python debug disable_viewer depth_l1_weight_init update_init_factor min_opacity success_threshold use_feat_bank add_opacity_dist lod; do
     "$program" train -s d -m r --$name 1 >out 2>err
     got=$?
-    [ "$got" = 2 ] && grep -q "^error: --$name: not here; " err
+    [ "$got" = 2 ] && grep -q "^error: --$name: not supported; " err
     report $? "--$name of other programs" "  got $got: $(cat err out)"
 done
 misuse 4 "nothing: not a run folder (wanted what gbtrace train wrote)" metrics -m nothing
@@ -177,16 +177,16 @@ misuse 4 "nowhere/x.gbt: cannot create: No such file or directory" compress noth
 misuse 4 "nowhere/x.json: cannot create: No such file or directory" compress nothing -o x.gbt --json nowhere/x.json
 misuse 4 "nowhere/x.mp4: cannot create: No such file or directory" render nothing -o nowhere/x.mp4 --path orbit
 misuse 2 "--output is missing (usage: gbtrace render RUN|GAUSSIANS [-o DIR])" render -m nothing
-misuse 2 "--iteration: not here; a run keeps its last model alone" render -m nothing --iteration 7000
+misuse 2 "--iteration: not supported; a run keeps only its last model" render -m nothing --iteration 7000
 
 # ---- files
 misuse 4 "nothing: no such file or folder" info nothing
 misuse 4 "no.gbt: cannot open: No such file or directory" info no.gbt
 misuse 4 "nothing/model.gbt: cannot open: No such file or directory" render nothing/model.gbt -o o --camera c.json
-misuse 2 "--downscale: not with a camera (the camera file says the size)" render nothing -o o --camera c.json --downscale 2
-misuse 2 "--insert: meshes are traced (wanted the renderer trace)" render nothing -o o --insert i.json --renderer reference
+misuse 2 "--downscale: cannot be combined with a camera file (which gives the size)" render nothing -o o --camera c.json --downscale 2
+misuse 2 "--insert: only the renderer trace supports this" render nothing -o o --insert i.json --renderer reference
 mkdir empty
-misuse 4 "empty/model.gbt: not there (wanted a run, a model file or plain Gaussians)" render empty && [ -z "$(ls empty)" ]
+misuse 4 "empty/model.gbt: does not exist (wanted a run, a model file or plain Gaussians)" render empty && [ -z "$(ls empty)" ]
 report $? "and nothing is made in it" "$(ls empty)"
 misuse 3 "empty: not a data set (wanted sparse/0/cameras.bin, transforms.json or transforms_train.json in it)" info empty
 printf 'GBTMODEL' >short.gbt
@@ -309,31 +309,31 @@ cmp -s along/frame_00001.png plain/c.png
 report $? "its first frame is what that camera takes" "$(ls -l along plain)"
 "$program" render tiny -o around-3 --path orbit --frames 3 >out 2>err && ! grep -q "an earlier film" err
 report $? "frames that are all replaced are not told" "$(cat err)"
-"$program" render tiny -o around-3 --path orbit --frames 2 >out 2>err && grep -q '^warning: around-3: frames from 3 on are of an earlier film$' err
+"$program" render tiny -o around-3 --path orbit --frames 2 >out 2>err && grep -q '^warning: around-3: frames from 3 on are left over from an earlier film$' err
 report $? "frames that a longer film left are" "$(cat err)"
 film "a low, near orbit around a place" 3 low --path orbit --frames 3 --look-at 0,0.5,-1e-1 --radius 2 --height -0.5
 cmp -s low/frame_00001.png around/frame_00001.png
 [ $? = 1 ]
 report $? "it is another film" ""
-misuse 2 "--look-at, --radius, --height: of an orbit (wanted the path orbit)" render tiny -o o --path interpolate --height 1
-misuse 2 "--look-at, --radius, --height: of an orbit (wanted the path orbit)" render tiny -o o --radius 1
+misuse 2 "--look-at, --radius, --height: only with the path orbit" render tiny -o o --path interpolate --height 1
+misuse 2 "--look-at, --radius, --height: only with the path orbit" render tiny -o o --radius 1
 for bad in 1,2 1,2,3,4 1,2,x 1,2,nan 1,,2 ,; do
     misuse 2 "--look-at: \"$bad\" (wanted X,Y,Z, as in 0.5,-1,2)" render tiny -o o --path orbit --look-at "$bad"
 done
 misuse 2 "--radius: bad value (wanted a number from 0 to 1e+09, got -1)" render tiny -o o --path orbit --radius -1
-misuse 2 "--frames, --fps, --size: of a film (wanted a path)" render tiny -o o --frames 3
-misuse 2 "film.mp4: a film wants a path" render tiny -o film.mp4
+misuse 2 "--frames, --fps, --size: only with a path" render tiny -o o --frames 3
+misuse 2 "film.mp4: a film needs a path" render tiny -o film.mp4
 printf '{"model": "equirectangular", "width": 16384, "height": 16384, "origin": [0, 0, -4], "target": [0, 0, 0], "up": [0, -1, 0]}' >large.json
 misuse 2 "large: a picture of 16384 x 16384 pixels (wanted at most 178956970 pixels)" render tiny -o o --camera large.json
-misuse 2 "film.MOV: no kind of film that is written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
+misuse 2 "film.MOV: this type of film cannot be written (wanted .mp4, .webm, .gif or a folder)" render tiny -o film.MOV --path orbit
 misuse 2 "picture.PNG: wanted a folder (the picture is named after its camera or view)" render tiny -o picture.PNG --camera c.json
-misuse 2 "--path: not with a camera" render tiny -o o --path orbit --camera c.json
-misuse 2 "--downscale: not with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
+misuse 2 "--path: cannot be combined with a camera file" render tiny -o o --path orbit --camera c.json
+misuse 2 "--downscale: cannot be combined with a path file (wanted the size of the film)" render tiny -o o --path path.json --downscale 2
 for other in "--data tiny" "--downscale 2" "--format exr" "--insert x.json" "--path orbit" "--preset fast" "--renderer raster"; do
-    misuse 2 "--output is missing (with --data, --downscale, --format, --insert, --path, --preset or --renderer nothing goes into tiny/renders)" render tiny $other
+    misuse 2 "--output is missing (with --data, --downscale, --format, --insert, --path, --preset or --renderer, pictures do not go into tiny/renders)" render tiny $other
 done
-misuse 2 "--outputs: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
-misuse 2 "--format: not with a film (wanted a folder)" render tiny -o film.mp4 --path orbit --format exr
+misuse 2 "--outputs: cannot be written as a film (wanted a folder)" render tiny -o film.mp4 --path orbit --outputs depth
+misuse 2 "--format: does not apply to a film (wanted a folder)" render tiny -o film.mp4 --path orbit --format exr
 misuse 2 "film.mp4: 21 x 10 pixels (wanted even numbers: films keep colours for 2 x 2 pixels)" render tiny -o film.mp4 --path orbit --size 21x10
 for bad in 20x10x5 -3x4; do
     misuse 2 "--size: bad value (wanted WxH like 1280x720, got $bad)" render tiny -o o --path orbit --size="$bad"
@@ -343,12 +343,12 @@ printf '{}' >path.json
 misuse 3 "path.json: not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")" render tiny -o o --path path.json
 PATH=/nowhere "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>err
 got=$?
-[ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film wants the program ffmpeg, which is not there (install it: apt install ffmpeg, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
+[ "$got" = 4 ] && [ "$(cat err)" = "error: film.mp4: a film needs the program ffmpeg, which is not installed (install it: apt install ffmpeg, or give a folder for pictures)" ] && [ ! -e film.mp4 ]
 report $? "a film without ffmpeg" "  got $got: $(cat err)"
 mkdir failing && printf '#!/bin/sh\ncat >/dev/null\nexit 1\n' >failing/ffmpeg && chmod +x failing/ffmpeg
 PATH=$PWD/failing:$PATH env --ignore-signal=CHLD "$program" render tiny -o film.mp4 --path orbit --frames 2 >out 2>err
 got=$?
-[ "$got" = 4 ] && grep -q '^error: film.mp4: ffmpeg failed (code 1): it said nothing$' err && [ ! -e film.mp4 ] && [ ! -e .film.mp4.tmp ]
+[ "$got" = 4 ] && grep -q '^error: film.mp4: ffmpeg failed (code 1): no output$' err && [ ! -e film.mp4 ] && [ ! -e .film.mp4.tmp ]
 report $? "an ffmpeg that fails, where how children end is ignored" "  got $got: $(cat err)"
 if command -v ffmpeg >/dev/null; then
     "$program" render tiny -o film.gif --path orbit --frames 2 >out 2>err && [ "$(head -c 4 film.gif)" = GIF8 ] && [ ! -e .film.gif.tmp ] &&
@@ -404,11 +404,11 @@ misuse 2 '--kernel: "tree,tree" (wanted list, packet, tree, single, embree or sp
 misuse 2 "--preset: bad value (wanted one of exact|default|fast, got slow)" $bench --preset slow
 misuse 2 "bench: bad alpha_max (wanted alpha_min, 0.5, or more, got 0.4)" $bench --alpha-min 0.5 --alpha-max 0.4
 misuse 2 "bench: bad alpha_min (wanted a number in [1e-30, 1), got 1e-31)" $bench --alpha-min 1e-31
-misuse 2 "gaussians.ply: plain Gaussians know no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
+misuse 2 "gaussians.ply: plain Gaussians have no cameras (wanted --camera FILE.json)" bench trace --model gaussians.ply
 mkdir alone && cp gaussians.ply alone && "$program" export gaussians.ply alone/gaussians.splat >out 2>err
 for study in speed crosscheck; do
     for file in alone/gaussians.ply alone/gaussians.splat; do
-        misuse 2 "$file: plain Gaussians know no cameras (wanted --camera FILE.json, or camera.json beside it)" study $study $file -o study
+        misuse 2 "$file: plain Gaussians have no cameras (wanted --camera FILE.json, or camera.json beside it)" study $study $file -o study
     done
 done
 misuse 2 "gaussians.ply: plain Gaussians, no anchors (wanted a run or its model.gbt)" study rate gaussians.ply -o study
@@ -423,15 +423,15 @@ misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, tim
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
 misuse 2 "made/sparse: is there, with cameras that stand still (wanted another folder)" make-scene tabletop -o made --lens rolling
-misuse 2 "--seeds: not of study speed (of paper time anchors)" study speed gaussians.ply -o study --seeds 3
-misuse 2 "--count: not of query within (of nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
-misuse 2 "--skip-test: not with --skip-train" render tiny -o o --skip-train --skip-test
+misuse 2 "--seeds: does not apply to study speed (only to paper time anchors)" study speed gaussians.ply -o study --seeds 3
+misuse 2 "--count: does not apply to query within (only to nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
+misuse 2 "--skip-test: cannot be combined with --skip-train" render tiny -o o --skip-train --skip-test
 printf '0 0 0 1\n3 4 0 2\n' >balls.txt
 prints "query, a header" '^query,rank,ball,distance,x,y,z,radius$' query nearest balls.txt --at 0,0,1
 prints "query, nearest" '^0,1,1,5,3,4,0,2$' query nearest balls.txt --at 0,0,0 -k 2
 prints "query along a ray" '^0,0,1,4,3,4,0,2$' query crossed balls.txt --at 3,0,0,0,1,0
 prints "query of plain Gaussians" '^0,0,[0-9]*,' query nearest gaussians.ply --at=-1,0,0
-misuse 2 "--at, --from: neither (wanted one of them)" query nearest balls.txt
+misuse 2 "--at, --from: neither is given (wanted exactly one of them)" query nearest balls.txt
 misuse 3 "at:1: 2 numbers (wanted 3)" query nearest balls.txt --at 0,0
 misuse 4 "nowhere.txt: cannot open: No such file or directory" query nearest nowhere.txt --at 0,0,0
 misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or crossed)' query near balls.txt --at 0,0,0
@@ -477,8 +477,8 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     find run -type f -exec cksum {} + | sort >before
     for other in '--preset fast' '--renderer raster' '--downscale 2' "--data moved"; do
         rm -rf moved && cp -r made moved
-        "$program" eval run $other >out 2>err && grep -q -F 'run/metrics.json and report.html stay; a JSON file that is named keeps these scores' err &&
-            "$program" eval run $other --json other.json >out 2>err && grep -q 'these scores are in other.json; ' err &&
+        "$program" eval run $other >out 2>err && grep -q -F 'run/metrics.json and report.html are unchanged; name a JSON file to keep these scores' err &&
+            "$program" eval run $other --json other.json >out 2>err && grep -q 'scores are only in other.json; ' err &&
             find run -type f -exec cksum {} + | sort | cmp -s - before
         report $? "eval $other changes nothing in the run" "$(cat err; find run -newer before)"
         "$program" eval run $other --json ./run/metrics.json >out 2>err
@@ -526,7 +526,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"
-    "$program" train -o run-small --resume --iterations 9 --threshold-factor 2 >out 2>err && grep -q '^run-small: 4 steps done; training goes on to step 9' err &&
+    "$program" train -o run-small --resume --iterations 9 --threshold-factor 2 >out 2>err && grep -q '^run-small: 4 steps done; training continues to step 9' err &&
         grep -q "^warning: a run is resumed with its own settings: threshold-factor = 1, not 2" err && [ "$(grep -c '^warning' err)" = 1 ] &&
         "$program" train -o run-small --resume >out 2>>err && grep -q '^run-small: all 9 steps are done' err && ! grep -q 0x0 err &&
         "$program" info run-small | grep -q 'trained   9 iterations'
@@ -543,7 +543,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "eval of an older run, in the folder where it was trained" "$(cat err out)"
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
     got=$?
-    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not there (tried made); --data says where it is now" ]
+    [ "$got" = 4 ] && [ "$(grep error err)" = "error: ../pair/run-small: its data set is not found (tried made); --data must name its new place" ]
     report $? "eval names the place of a missing data set" "  got $got: $(cat err out)"
     printf 'made\n/gone/made\n../gone\n' >pair/run-small/data_places
     (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err
@@ -573,15 +573,15 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     "$program" export run thin.sog --gaussians 1010 --refine 2 --json thin.json >out 2>err && grep -q '^  "gaussians": 1010,$' thin.json && grep -q '^  "thinned": [1-9]' thin.json &&
         grep -q ' that are blended least' out
     report $? "export keeps the Gaussians that are blended most" "$(cat err out)"
-    misuse 2 "--gaussians: 10 of plain.ply (wanted 0 or more, and a trained model)" export plain.ply o.ply --gaussians 10
-    misuse 2 "--refine: 3 of plain.ply (wanted a trained model)" export plain.ply o.ply --refine 3
-    misuse 2 "--no-backdrop: not for plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
-    misuse 2 "--data: not for plain.ply (wanted a trained model)" export plain.ply o.ply --data made
+    misuse 2 "--gaussians: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --gaussians 10
+    misuse 2 "--refine: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --refine 3
+    misuse 2 "--no-backdrop: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
+    misuse 2 "--data: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --data made
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply o.ply
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply --json o.ply
     misuse 2 "plain.ply: would be overwritten (--json must be another file)" export plain.ply o.ply --json plain.ply
-    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --camera x.json
-    misuse 2 "--data: not with a camera or a path file (they are the cameras)" render plain.ply -o drawn --data made --path x.json
+    misuse 2 "--data: cannot be combined with a camera file or a path file (which give the cameras)" render plain.ply -o drawn --data made --camera x.json
+    misuse 2 "--data: cannot be combined with a camera file or a path file (which give the cameras)" render plain.ply -o drawn --data made --path x.json
     misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000
     for file in plain.ply plain.splat plain.spz plain.glb; do
         prints "info of $file" "^$file: plain Gaussians$" info $file
@@ -604,8 +604,8 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     wait "$viewer" && grep -q '^http://[1-9][0-9.]*:[1-9][0-9]*/?token=[0-9a-f]\{32\}$' out && ! grep -q error err
     report $? "view --host prints an address with a token" "$(cat err out)"
     misuse 2 '--host: "example.org" (wanted an IPv4 address of this machine, or 0.0.0.0 for all that it has)' view run --host example.org
-    misuse 4 "nowhere: not there (wanted a run, a model file or plain Gaussians)" view nowhere
-    misuse 4 "made/model.gbt: not there (wanted a run, a model file or plain Gaussians)" view made
+    misuse 4 "nowhere: does not exist (wanted a run, a model file or plain Gaussians)" view nowhere
+    misuse 4 "made/model.gbt: does not exist (wanted a run, a model file or plain Gaussians)" view made
     misuse 2 "--port: bad value (wanted a whole number from 0 to 65535, got 65536)" view run --port 65536
     "$program" export run result/ --refine 2 >out 2>err && grep -q '^result/: .* dB to the model' out && ls result/point_cloud/iteration_*/point_cloud.ply >>out 2>>err &&
         grep -q "^Namespace(sh_degree=3, source_path='.* depths='', .* train_test_exp=False, " result/cfg_args && [ "$(grep -c '"img_name": ' result/cameras.json)" = 4 ] &&
@@ -614,12 +614,12 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         [ "$(ls result_test | wc -l)" = 1 ] && sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o result_all >>out 2>>err &&
         [ "$(ls result_all | wc -l)" = 4 ] && "$program" export result back.spz >>out 2>>err
     report $? "a result folder of 3DGS, out and in" "$(cat err out)"
-    misuse 2 "result: a result folder is made once, of a run" export result other/
+    misuse 2 "result: wanted a run as input, and one result folder at most" export result other/
     misuse 4 "nothing: cannot open: No such file or directory" import nothing -o imported
     misuse 4 "empty: no model of Scaffold-GS (wanted point_cloud/iteration_N/point_cloud.ply or point_cloud.ply in it)" import empty -o imported
     misuse 2 "run: holds a trained run (wanted another folder)" import empty -o run
-    misuse 4 "nowhere: the data set is not there" import empty -o imported --data nowhere
-    misuse 2 "scene.obj: which format? (wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz)" export run scene.obj
+    misuse 4 "nowhere: the data set does not exist" import empty -o imported --data nowhere
+    misuse 2 "scene.obj: unknown file ending (wanted .ply, .compressed.ply, .splat, .spz, .v4.spz, .sog, .glb, .usda or .usdz)" export run scene.obj
     misuse 2 "--sh-degree: bad value (wanted a whole number from 0 to 3, got 4)" export run scene.ply --sh-degree 4
     misuse 4 "nothing: cannot open: No such file or directory" eval run --lpips nothing
     misuse 4 "nothing: cannot open: No such file or directory" compare pictures-same/*.png pictures-same/*.png --lpips nothing

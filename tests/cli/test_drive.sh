@@ -44,7 +44,7 @@ as_json err '[x["total"] for x in e if x.get("stage") == "score" and x["done"] =
     as_json err '[x["total"] for x in e if x.get("stage") == "refine" and x["done"] == 1 and x["seconds"] > 1e-4] == [1]'
 report $? "the time of a stage is that of its first view or step, too" "$(cat err)"
 "$program" train made -o none --pace 1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,2 --iterations 20 2>err
-[ $? = 2 ] && [ "$(cat err)" = "error: --iterations: 20 (wanted the 21 of --pace in all, or only one of the two)" ]
+[ $? = 2 ] && [ "$(cat err)" = "error: --iterations: 20, but --pace adds up to 21 (wanted only one of the two)" ]
 report $? "a pace and another number of iterations" "$(cat err)"
 "$program" eval run --quiet >out 2>err && [ ! -s err ] && [ ! -s out ]
 report $? "quiet" "$(cat err)"
@@ -188,7 +188,7 @@ printf "Namespace(source_path='made', images='images_4', resolution=-1)" >widths
 "$program" import widths -o at_quarter >out 2>err && "$program" info at_quarter | grep -q '^  config    downscale = 4$'
 report $? "and so does images_4" "$(cat err out; "$program" info at_quarter)"
 printf "Namespace(source_path='gone', resolution=16)" >widths/cfg_args
-"$program" import widths -o unknown_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: tell eval the downscale ' err)" = 1 ]
+"$program" import widths -o unknown_width >out 2>err && [ "$(grep -c '^warning: trained on photos 16 pixels wide, .*: set the downscale when you run gbtrace eval ' err)" = 1 ]
 report $? "without the data set it is told" "$(cat err out)"
 cp at_width/model.gbt before.gbt && ! "$program" import widths -o at_width >out 2>err && [ "$(cat err)" = "error: at_width: holds a trained run (wanted another folder)" ] && cmp before.gbt at_width/model.gbt >>out
 report $? "a run that was imported before stays" "$(cat err out)"

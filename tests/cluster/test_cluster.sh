@@ -49,7 +49,7 @@ code=$?
 report $? "stopped with 2, resumed with 4: the same model" "code $code: $(cat out err)"
 on 4 "$program" train data -o many --iterations 30 >out 2>err
 code=$?
-[ $code = 2 ] && [ "$(errors)" = 1 ] && grep -q '^error: --views: 1 a step, for 4 processes (wanted a number of processes that divides it)$' err
+[ $code = 2 ] && [ "$(errors)" = 1 ] && grep -q '^error: --views: 1 per step cannot be shared by 4 processes (wanted a number that divides it)$' err
 report $? "more processes than views" "code $code: $(cat out err)"
 on 2 "$program" train data -o many --no-such-option >out 2>err
 code=$?
@@ -64,14 +64,14 @@ report $? "data that one process does not find" "code $code: $(cat out err)"
 mkdir other && cp -r data other && cp data/images/0001.png other/data/images/0002.png
 on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd other ;; esac; exec "$@"' sh "$program" train data -o "$work/differs" --views 2 --iterations 30 >out 2>err
 code=$?
-[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 reads other data (data has photos of the same names, but other pictures)$' err && [ ! -e differs/config ]
+[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 reads other data than process 0 (data has photos of the same names, but other pictures)$' err && [ ! -e differs/config ]
 report $? "data that differ" "code $code: $(cat out err)"
 "$program" train data -o forked --views 2 --iterations 30 --stop-at-step 6 --quiet >out 2>&1
 mkdir fork && cp -r data forked fork
 "$program" train -o forked --resume --stop-at-step 12 --quiet >>out 2>&1
 on 2 sh -c 'case ${OMPI_COMM_WORLD_RANK:-$PMI_RANK} in 1) cd fork ;; esac; exec "$@"' sh "$program" train -o forked --resume --quiet >>out 2>err
 code=$?
-[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 goes on from another checkpoint (step 6 with [0-9]* anchors, not 12 with [0-9]*)$' err
+[ $code = 3 ] && [ "$(errors)" = 1 ] && grep -q '^error: process 1 resumes from another checkpoint (step 6 with [0-9]* anchors, not 12 with [0-9]*)$' err
 report $? "checkpoints that differ" "code $code: $(cat out err)"
 on 2 "$program" train data -o "$work/killed" --views 2 --iterations 1000000 --save-every 1s --quiet >out 2>err &
 started=$!

@@ -288,7 +288,8 @@ static void files_of_balls_and_queries(void **state)
     assert_refused(gbt_query(lists, &def, stdout, &err), &err, GBT_ERR_FORMAT, "property x is a list");
     err = (gbt_error){0};
     def = gbt_query_def_default();
-    assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT, "at, from: neither");
+    assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT,
+                   "at, from: neither is given");
     err = (gbt_error){0};
     def.at = "1,2";
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT, "at:1: 2 numbers");

@@ -471,11 +471,13 @@ static void a_sky_that_is_not_learned_is_told(void **state)
         void (*change)(image *photo, size_t view);
         bool compat;
         const char *says;
-    } cases[] = {{NULL, false, NULL},
-                 {make_opaque, false, NULL},
-                 {cut_out, false, "no sky is learned: photos with an alpha channel lie on one colour"},
-                 {cut_out_later, false, "no sky is learned: photos with an alpha channel lie on one colour"},
-                 {NULL, true, "no sky is learned: compat has one colour"}};
+    } cases[] = {
+        {NULL, false, NULL},
+        {make_opaque, false, NULL},
+        {cut_out, false, "no sky is learned: photos with an alpha channel are composited on one colour"},
+        {cut_out_later, false,
+         "no sky is learned: photos with an alpha channel are composited on one colour"},
+        {NULL, true, "no sky is learned: compat uses one colour"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char warning[PATH_SIZE] = "";
         gbt_train_def def = run_def();

@@ -263,7 +263,7 @@ static void held_out_photos_are_aligned_after_a_signal(void **state)
     train_ok(tiny, in_folder("unstopped"), &def);
     signal(SIGTERM, SIG_IGN); /* should it come too late */
     assert_int_equal(pthread_create(&thread, NULL, signal_at_summary, summary), 0);
-    train_fails(tiny, in_folder("stopped"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
+    train_fails(tiny, in_folder("stopped"), &def, GBT_ERR_INTERRUPTED, "resume continues");
     assert_int_equal(pthread_join(thread, NULL), 0);
     signal(SIGTERM, SIG_DFL);
     file_bytes before = read_bytes(summary);

@@ -191,10 +191,10 @@ static void other_data_are_refused(void **state)
     assert_ok(gbt_make_scene(&scene_def, in_folder("elsewhere"), &err));
     train_fails(in_folder("elsewhere"), in_folder("first"), &on, GBT_ERR_FORMAT, "other data");
     train_ok(tiny, in_folder("first"), &on);
-    train_fails(tiny, in_folder("no run"), &on, GBT_ERR_IO, "holds no run to go on with");
+    train_fails(tiny, in_folder("no run"), &on, GBT_ERR_IO, "holds no run to resume");
     assert_false(file_exists(in_folder("no run")));
     on.overwrite = true;
-    train_fails(tiny, in_folder("first"), &on, GBT_ERR_ARGUMENT, "wanted one of them");
+    train_fails(tiny, in_folder("first"), &on, GBT_ERR_ARGUMENT, "wanted one of the two");
 }
 
 /* The sections of a container, but the one of this name. */
@@ -341,7 +341,7 @@ static void a_budget_that_reading_takes_is_told(void **state)
     train_ok(tiny, in_folder("too little"), &def);
     be_quiet();
     if (strncmp(warnings, "budget: reading the data took ", 30) != 0 ||
-        strstr(warnings, " of 0.0001 s (wanted at least ") == NULL)
+        strstr(warnings, " of 0.0001 s (wanted a budget of at least ") == NULL)
         fail_msg("%s", warnings);
 }
 
@@ -431,7 +431,7 @@ static void an_overwritten_run_is_gone(void **state)
     for (int i = 0; i < OLD; i++)
         assert_false(file_exists(in_folder("lost/%s", old[i])));
     assert_true(file_exists(in_folder("lost/notes.txt")));
-    train_fails(tiny, in_folder("lost"), &on, GBT_ERR_IO, "holds no run to go on with");
+    train_fails(tiny, in_folder("lost"), &on, GBT_ERR_IO, "holds no run to resume");
     /* Where there was no run, files of such names are somebody else's. */
     write_text(in_folder("lost/report.html"), "mine");
     write_text(in_folder("lost/renders/test/0.png"), "mine");

@@ -980,7 +980,7 @@ static void exposure_resumes_to_the_same_bits(void **state)
     def.exposure = true;
     train_ok(tiny, in_folder("exposure straight"), &def);
     def.stop_at_step = 23;
-    train_fails(tiny, in_folder("exposure halves"), &def, GBT_ERR_INTERRUPTED, "resume goes on");
+    train_fails(tiny, in_folder("exposure halves"), &def, GBT_ERR_INTERRUPTED, "resume continues");
     gbt_train_def more = gbt_train_def_default();
     more.resume = true;
     gbt_set_threads(3);

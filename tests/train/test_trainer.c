@@ -1039,7 +1039,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
         before[i] = read_bytes(in_folder("kept/%s", files[i]));
     def.seed = 6;
     def.stop_at_step = 0;
-    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "kept: holds a run already");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "kept: already holds a run");
     for (int i = 0; i < 4; i++) {
         file_bytes after = read_bytes(in_folder("kept/%s", files[i]));
         assert_int_equal(before[i].count, after.count);
@@ -1055,7 +1055,7 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "by `overwrite`");
     assert_int_equal(unlink(in_folder("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_folder("kept/aside"), in_folder("kept/model.gbt")), 0);
-    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "holds a run already");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "already holds a run");
 
     train_ok(tiny, in_folder("anew"), &def);
     gbt_error err = {0};
@@ -1372,7 +1372,7 @@ static void pace_is_read(void **state)
     def.pace = "1,2";
     train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace");
     def.pace = "0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0";
-    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: no step in all");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: adds up to no step");
     def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
     def.iterations = 209;
     train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");

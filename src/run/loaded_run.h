@@ -99,8 +99,8 @@ enum { FILE_NAME_SIZE = 256 };
 void loaded_run_file_name(const char *view_name, char out[FILE_NAME_SIZE]);
 
 /** The same for an open view. If another view has the same name ("a.png" and "a.jpg"), or files of such names
-    beside it ("a.photo.png" and "a.png"), a hash of the whole name is appended. Cost: compares with all views.
- */
+    beside it ("a.photo.png" and "a.png"), a hash of the whole name is appended. Cost: compares it with all
+    others. */
 void loaded_run_view_name(const loaded_run *r, size_t view, char out[FILE_NAME_SIZE]);
 
 #endif

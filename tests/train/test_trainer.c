@@ -323,7 +323,7 @@ static void more_memory_than_allowed(void **state)
     assert_int_equal(gbt_train(tiny, in_folder("limit"), &def, &err), GBT_ERR_NO_MEMORY);
     if (strstr(err.text, "memory: 300 MiB is too little: ") == NULL)
         fail_msg("%s", err.text);
-    assert_non_null(strstr(err.text, "after step 1; saved in "));
+    assert_non_null(strstr(err.text, "at step 1; saved in "));
     resume_ok(in_folder("limit")); /* it was saved, and goes on with more */
     assert_same_file(straight_run(), in_folder("limit/model.gbt"));
 }
@@ -1049,10 +1049,10 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     }
     /* The checkpoint alone can be resumed, the model alone is a finished run. */
     assert_int_equal(rename(in_folder("kept/model.gbt"), in_folder("kept/aside")), 0);
-    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "by `resume`");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "with `resume`");
     assert_int_equal(
         rename(in_folder("kept/checkpoints/last.gbt"), in_folder("kept/checkpoints/last.gbt.prev")), 0);
-    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "by `overwrite`");
+    train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "with `overwrite`");
     assert_int_equal(unlink(in_folder("kept/checkpoints/last.gbt.prev")), 0);
     assert_int_equal(rename(in_folder("kept/aside"), in_folder("kept/model.gbt")), 0);
     train_fails(tiny, in_folder("kept"), &def, GBT_ERR_ARGUMENT, "already holds a run");
@@ -1066,6 +1066,28 @@ static void a_run_is_overwritten_only_when_asked(void **state)
                        "iterations = 3\nseed = 6\nstep-pixels = 432\noverwrite = 1\n", &err) != GBT_OK)
         fail_msg("%s", err.text);
     assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
+}
+
+static void foreign_files_are_kept(void **state)
+{
+    (void)state;
+    gbt_train_def def = run_def();
+    def.stop_at_step = 2;
+    assert_ok(file_make_folder(in_folder("foreign"), NULL));
+    assert_ok(file_write_atomic(in_folder("foreign/config"), "theirs", 6, NULL));
+    train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_ARGUMENT,
+                "foreign/config: exists, but its folder holds no run");
+    assert_false(file_exists(in_folder("foreign/checkpoints")));
+    file_bytes after = read_bytes(in_folder("foreign/config"));
+    assert_int_equal(after.count, 6);
+    assert_memory_equal(after.data, "theirs", 6);
+    mem_free(after.data);
+    def.overwrite = true;
+    train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    def.overwrite = false; /* without its checkpoint the folder still says that it was a run */
+    assert_int_equal(unlink(in_folder("foreign/checkpoints/last.gbt")), 0);
+    assert_int_equal(unlink(in_folder("foreign/model.gbt")), 0);
+    train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_INTERRUPTED, "after step 2");
 }
 
 /* A run has read its photos when it starts; one that is resumed reads them again. */
@@ -1375,7 +1397,7 @@ static void pace_is_read(void **state)
     train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: adds up to no step");
     def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
     def.iterations = 209;
-    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209 (wanted the 210 of");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209, but `pace` adds up to 210");
     trainer t;
     def.iterations = 210;
     open_ok(&t, tiny, &def);
@@ -2037,6 +2059,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(data_without_training_photos_is_refused),
         cmocka_unit_test(validation_needs_no_held_out_photo),
         cmocka_unit_test(a_run_is_overwritten_only_when_asked),
+        cmocka_unit_test(foreign_files_are_kept),
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
         cmocka_unit_test(poses_stay_with_their_model),

@@ -60,7 +60,7 @@ void options_table(const command *self, option_table *t)
          .kind = OPTION_STRING,
          .value = &config_path,
          .value_name = "FILE",
-         .help = "read options as name = value lines; environment and command line override them"},
+         .help = "read name = value lines; environment and command line override them"},
         {.name = "help",
          .short_name = 'h',
          .kind = OPTION_FLAG,

@@ -66,11 +66,11 @@ double schedule_rate_end(double views);
 
 /**
  * Share of the anchors in view that each step until SCHEDULE_EXACT_FROM leaves out at random: 0 up to 100
- * `looks` (uses of each photo in the whole run, by pace_expected()), then 1 - (100 / looks)^0.3: 0.28 at 300,
+ * `looks` (uses of each pixel in the whole run, by pace_expected()), then 1 - (100 / looks)^0.3: 0.28 at 300,
  * 0.5 at 1,000.
  *
- * This is dropout against overfitting: a run that uses its photos so often would fit them better than the
- * scene. Anchors that cannot rely on each other move to where all photos want them (docs/training.md).
+ * This is dropout against overfitting: a run that uses its pixels so often would fit the photos better than
+ * the scene. Anchors that cannot rely on each other move to where all photos want them (docs/training.md).
  */
 float schedule_left_out(double looks);
 

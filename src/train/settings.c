@@ -72,8 +72,7 @@ static const gbt_train_setting settings[] = {
     {NAMED("eval-split", eval_split), .kind = GBT_SETTING_TEXT, .unit = "SPLIT", .text = "auto",
      .choices = "auto|every=8|none|validate=8", .saved = true,
      .help = "held-out photos: auto (as the data set says, else every=8), every=N, every=N:K (from photo K "
-             "on), none, list=FILE; validate=N: instead, every N-th of the training photos, to choose "
-             "settings by"},
+             "on), none, list=FILE; validate=N: every N-th training photo instead"},
     {NAMED("alpha", alpha), CHOICE(GBT_ALPHA_NAMES), .number = GBT_ALPHA_AUTO, .saved = true,
      .help = "transparent pixels of photos: composited on black or white, or masked out of loss and scores; "
              "auto: "
@@ -97,11 +96,11 @@ static const gbt_train_setting settings[] = {
     {NAMED("compat", compat), FLAG, .rare = true, .saved = true,
      .help = "follow the reference implementation in every detail (docs/compat.md)"},
     {NAMED("exposure", exposure), FLAG, .saved = true,
-     .help = "learn a colour matrix per photo, for photos that differ in exposure or white balance"},
+     .help = "learn a colour matrix per photo (exposure, white balance)"},
     {NAMED("find-exposure", find_exposure), FLAG, .rare = true, .number = 1, .saved = true,
      .help = "do not turn exposure on automatically where the photos' exposures differ"},
     {NAMED("refine-poses", refine_poses), FLAG, .saved = true, .if_changed = true,
-     .help = "also correct the photos' poses, for data sets whose poses are not exact"},
+     .help = "also correct the poses of the photos"},
     {NAMED("splats-until", splats_until), RANGE(DOUBLE, 0, 1, "F"), .saved = true, .rare = true,
      .help = "train by splatting up to this fraction of the run, then by ray tracing"},
     {NAMED("grow-until", grow_until), RANGE(DOUBLE, 0, 1, "F"), .number = 0.5, .saved = true, .rare = true,
@@ -120,8 +119,8 @@ static const gbt_train_setting settings[] = {
      .help = "also write RUN/events.out.tfevents.* for TensorBoard"},
     {NAMED("resume", resume), FLAG,
      .help =
-         "resume RUN from its last checkpoint, with its settings and data; given other iterations or another "
-         "budget, train up to that total, even if the run was finished"},
+         "resume RUN from its last checkpoint; with other iterations or another budget, up to that total, "
+         "even if it was finished"},
     {NAMED("overwrite", overwrite), FLAG, .help = "replace a run that the folder already holds: it is lost"},
     {NAMED("lossless", lossless), FLAG, .saved = true, .if_changed = true, .rare = true,
      .help = "store the model without loss (see compress); the file is about seven times larger"},

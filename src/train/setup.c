@@ -17,6 +17,7 @@
 #include "train/near_distance.h"
 #include "train/scale_limit.h"
 #include "train/setup_data.h"
+#include "train/step_pixels.h"
 #include "train/trainer.h"
 
 enum { DISTANCE_VIEWS = 4096 };
@@ -145,6 +146,10 @@ static gbt_status make_state(trainer *t, gbt_error *err)
 
 static gbt_status make_views(trainer *t, gbt_error *err)
 {
+    for (size_t i = 0; i < t->train_count; i++) {
+        const gbt_camera camera = photos_camera(&t->photos, t->train_views[i], 0);
+        t->pixel_share += step_pixel_share(&camera, &t->rules) / (double)t->train_count;
+    }
     t->view_count = (size_t)t->def.views / (size_t)gbt_cluster_size();
     t->first_view = t->view_count * (size_t)gbt_cluster_rank();
     t->views = mem_calloc(t->view_count, sizeof *t->views, "views", err);

@@ -11,8 +11,13 @@ int step_spacing(const gbt_camera *camera, double pixels)
     return (int)fmin(fmax(floor(sqrt(times) + 0.5), 1), smaller);
 }
 
-double step_pixel_count(const gbt_camera *camera, const train_rules *rules)
+double step_pixel_share(const gbt_camera *camera, const train_rules *rules)
 {
     const double spacing = step_spacing(camera, rules->step_pixels);
-    return (double)camera->width * camera->height / (spacing * spacing);
+    return 1 / (spacing * spacing);
+}
+
+double step_pixel_count(const gbt_camera *camera, const train_rules *rules)
+{
+    return (double)camera->width * camera->height * step_pixel_share(camera, rules);
 }

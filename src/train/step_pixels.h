@@ -14,6 +14,9 @@
  */
 int step_spacing(const gbt_camera *camera, double pixels);
 
+/** The resulting share of the photo's pixels, approximately: 1 / n^2. */
+double step_pixel_share(const gbt_camera *camera, const train_rules *rules);
+
 /** The resulting number of pixels, approximately. */
 double step_pixel_count(const gbt_camera *camera, const train_rules *rules);
 

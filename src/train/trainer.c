@@ -203,7 +203,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                               .factor = t->def.learning_rate_factor * sqrt(views),
                               .end = schedule_rate_end(all_views),
                               .views = t->def.views});
-    t->left_out = leaves_out ? schedule_left_out(all_views / (double)t->train_count) : 0;
+    t->left_out = leaves_out ? schedule_left_out(all_views / (double)t->train_count * t->pixel_share) : 0;
 
     /* Views, with some pixels of each: render, loss, gradient. */
     GBT_TRY(run_views(t, out, err));

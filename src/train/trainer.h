@@ -68,6 +68,7 @@ struct trainer {
     pace pace;
     char pace_words[PACE_TEXT_SIZE]; /* def.pace in the form of files, if there is one */
     uint64_t step;                   /* steps done */
+    double pixel_share;              /* of the training photos' pixels that a step uses, in the mean */
     float left_out;                  /* share of the anchors in view that this step leaves out at random:
                                         schedule_left_out() */
     uint64_t round_step;             /* steps done at the last round of growth */

@@ -522,7 +522,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "a lossless model is copied without loss only" "$(cat err out)"
     "$program" train made -o run-small --iterations 4 >out 2>err
     got=$?
-    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*by --resume,.*by --overwrite)' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
+    [ "$got" = 2 ] && [ "$(grep -c '^error: run-small: .*with --resume, .*with --overwrite, ' err)" = 1 ] && cmp -s small.gbt run-small/model.gbt
     report $? "train leaves a run alone" "  got $got: $(cat err out)"
     "$program" train made -o run-small --iterations 4 --overwrite >out 2>err && "$program" info run-small | grep -q 'trained   4 iterations'
     report $? "train --overwrite trains anew" "$(cat err out; "$program" info run-small)"

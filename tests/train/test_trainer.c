@@ -1397,7 +1397,8 @@ static void pace_is_read(void **state)
     train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "pace: adds up to no step");
     def.pace = "1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20";
     def.iterations = 209;
-    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT, "iterations: 209, but `pace` adds up to 210");
+    train_fails(tiny, in_folder("bad_pace"), &def, GBT_ERR_ARGUMENT,
+                "iterations: 209, but `pace` adds up to 210");
     trainer t;
     def.iterations = 210;
     open_ok(&t, tiny, &def);

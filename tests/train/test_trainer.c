@@ -1728,7 +1728,7 @@ static step_view *pick_ok(trainer *t)
     return &t->views[0];
 }
 
-/* A step of four views is four looks at photos. */
+/* A step of four views is four looks at photos, here of one pixel in 4. */
 static void steps_leave_out_by_looks(void **state)
 {
     (void)state;

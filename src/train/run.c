@@ -68,26 +68,6 @@ static gbt_status name_paths(const char *run, run_paths *p, gbt_error *err)
                      err);
 }
 
-/* Refuse a folder that holds no run but files whose names a run would take: they are somebody else's. Only
-   data_places, which is written first, tells a run that was stopped before its first checkpoint. */
-static gbt_status refuse_foreign_files(const char *run, gbt_error *err)
-{
-    static const char *const names[] = {"data_places", "config",       "log.csv",
-                                        "train.json",  "metrics.json", "report.html"};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        char path[RUN_PATH_SIZE];
-        GBT_TRY(file_join(path, sizeof path, run, names[i], err));
-        if (!file_exists(path))
-            continue;
-        return i == 0 ? GBT_OK
-                      : base_fail(err, GBT_ERR_ARGUMENT,
-                                  "%.1000s: exists, but its folder holds no run (choose another folder, or "
-                                  "replace such files with `overwrite`)",
-                                  path);
-    }
-    return GBT_OK;
-}
-
 static gbt_status open_folder(const char *run, const gbt_train_def *def, const run_paths *p, gbt_error *err)
 {
     char checkpoints[RUN_PATH_SIZE];
@@ -105,8 +85,6 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
                          "%.1000s: already holds a run (continue it with `resume`, replace it with "
                          "`overwrite`, or choose another folder)",
                          run);
-    if (!def->resume && !def->overwrite)
-        GBT_TRY(refuse_foreign_files(run, err));
     GBT_TRY(file_make_folder(checkpoints, err));
     GBT_TRY(file_check_folder_creatable(run, err));
     return file_check_folder_creatable(checkpoints, err);
@@ -314,13 +292,13 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 {
     char config[CONFIG_TEXT_SIZE], split[RUN_SPLIT_TEXT_SIZE];
     gbt_train_def def = t->def;
-    GBT_TRY(run_data_save(run, t->scene.folder, err));
     GBT_TRY(run_split_save(run, &t->scene, err));
     GBT_TRY(run_split_text(run, def.eval_split, split, err));
     if (strlen(split) < SETTING_TEXT_SIZE)
         def.eval_split = split;
     config_text(&def, t->scene.folder, config, sizeof config);
-    return file_write_atomic(paths->config, config, strlen(config), err);
+    GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
+    return run_data_save(run, t->scene.folder, err);
 }
 
 /* Save everything before the held-out photos are aligned, because alignment takes time and can be

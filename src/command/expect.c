@@ -74,12 +74,12 @@ void expect_print(const expectation *e, FILE *out)
     if (e->score_seconds > 0)
         fprintf(out, ", then %.0f s for the scores", fmax(1, rounded(e->score_seconds)));
     const memory_need *m = &e->memory;
-    fprintf(out,
-            "\n  memory    parts, MB: program %.0f; reading files %.0f; after that points %.0f, photos %.0f, "
-            "and in turn decoding photos %.0f, trees %.0f, anchors %.0f with one view %.0f; smallest "
-            "possible limit "
-            "%.0f MiB\n",
-            rounded(m->program / 1e6), rounded(m->reading / 1e6), rounded(m->points / 1e6),
-            rounded(m->photos / 1e6), rounded(m->decoding / 1e6), rounded(m->trees / 1e6),
-            rounded(m->anchors / 1e6), rounded(m->view / 1e6), ceil(m->least / 0x1p20));
+    fprintf(
+        out,
+        "\n  memory    parts, MB: program %.0f; reading files %.0f; after that points %.0f, photos %.0f, "
+        "and in turn decoding photos %.0f, trees %.0f, anchors %.0f with one view %.0f; smallest possible "
+        "limit %.0f MiB\n",
+        rounded(m->program / 1e6), rounded(m->reading / 1e6), rounded(m->points / 1e6),
+        rounded(m->photos / 1e6), rounded(m->decoding / 1e6), rounded(m->trees / 1e6),
+        rounded(m->anchors / 1e6), rounded(m->view / 1e6), ceil(m->least / 0x1p20));
 }

@@ -24,9 +24,14 @@ gbt_status json_read_text(const char *text, size_t length, const char *name, jso
 {
     json_error_t where;
     const size_t mark = file_mark_bytes(text, length);
+    *out = NULL;
+    if (length == mark)
+        return base_fail(err, GBT_ERR_FORMAT, "%s:1: file is empty (wanted JSON)", name);
     *out = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
+    if (*out == NULL && json_error_code(&where) == json_error_out_of_memory)
+        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", name);
     if (*out == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not JSON: %s", name, where.line, where.text);
+        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", name, where.line, where.text);
     if (json_is_object(*out))
         return GBT_OK;
     json_decref(*out);

@@ -21,8 +21,8 @@ typedef struct json_fields {
     gbt_error *err;
 } json_fields;
 
-/** The JSON object in a file; duplicate names are an error. Free with json_decref(). GBT_ERR_IO or
-    GBT_ERR_FORMAT. */
+/** The JSON object in a file, which may begin with a byte order mark; duplicate names are an error. Free with
+    json_decref(). GBT_ERR_IO, GBT_ERR_FORMAT or GBT_ERR_NO_MEMORY. */
 gbt_status json_read(const char *path, json_t **out, gbt_error *err);
 
 /** json_read() for text in memory; messages use `name` in place of the file name. */

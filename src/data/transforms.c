@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "base/file.h"
+#include "data/json_fields.h"
 #include "data/transforms_camera.h"
 
 enum { NAME_SIZE = RAW_NAME_LIMIT + 1, PATH_SIZE = RAW_NAME_LIMIT + 4096, ENDING_SIZE = 8 };
@@ -177,23 +178,9 @@ gbt_status transforms_read(const source_file *file, const char *folder, bool may
                            char **points_name, gbt_error *err)
 {
     *points_name = NULL;
-    if (file->size == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s:1: file is empty (wanted JSON)", file->name);
-    json_error_t fault;
-    const size_t first = file_mark_bytes(file->bytes, file->size);
-    json_t *root =
-        json_loadb((const char *)file->bytes + first, file->size - first, JSON_REJECT_DUPLICATES, &fault);
-    if (root == NULL) {
-        if (json_error_code(&fault) == json_error_out_of_memory)
-            return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", file->name);
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", file->name, fault.line,
-                         fault.text);
-    }
-    gbt_status status;
-    if (json_is_object(root))
-        status = read_root(file, root, folder, may_be_empty, out, points_name, err);
-    else
-        status = base_fail(err, GBT_ERR_FORMAT, "%s:1: wanted a JSON object", file->name);
+    json_t *root;
+    GBT_TRY(json_read_text((const char *)file->bytes, file->size, file->name, &root, err));
+    const gbt_status status = read_root(file, root, folder, may_be_empty, out, points_name, err);
     json_decref(root);
     return status;
 }

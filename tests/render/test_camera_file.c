@@ -128,9 +128,9 @@ static void rays_beside_it(void **state)
 static const struct bad_case {
     const char *text, *message; /* behind "PATH" */
 } bad_cases[] = {
-    {"", ":1: not JSON: "},
+    {"", ":1: file is empty"},
     {"[1]", ": wanted a JSON object"},
-    {"{\"width\": 1, \"width\": 2}", ":1: not JSON: duplicate object key"},
+    {"{\"width\": 1, \"width\": 2}", ":1: not usable JSON: duplicate object key"},
     {"{" POSE "}", ": fov_x_deg: missing (degrees from the left edge of the picture to the right)"},
     {"{" POSE ", \"fov_x_deg\": 180}", ": fov_x_deg: wanted a number in (0, 179.9]"},
     {"{" POSE ", \"fov_x_deg\": 0}", ": fov_x_deg: wanted a number in (0, 179.9]"},

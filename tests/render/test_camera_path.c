@@ -602,7 +602,7 @@ static void nerfstudio_world(void **state)
 static const struct bad_case {
     const char *text, *message;
 } bad_cases[] = {
-    {"", ":1: not JSON: "},
+    {"", ":1: file is empty"},
     {"{}", ": not a camera path (wanted \"cameras\", or nerfstudio's \"camera_path\")"},
     {"{\"cameras\": []}", ": cameras: wanted a list of 1 to 100000 cameras"},
     {"{\"cameras\": {}}", ": cameras: wanted a list of 1 to 100000 cameras"},

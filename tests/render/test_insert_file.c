@@ -77,7 +77,7 @@ static void placed(void **state)
 static const struct bad_case {
     const char *text, *message; /* behind "PATH" */
 } bad_cases[] = {
-    {"", ":1: not JSON: "},
+    {"", ":1: file is empty"},
     {"[]", ": wanted a JSON object"},
     {"{}", ": objects: wanted a list of 1 to 1000 objects"},
     {"{\"objects\": []}", ": objects: wanted a list of 1 to 1000 objects"},

@@ -15,12 +15,12 @@ typedef struct gbt_compress_def {
     double quality; /* dB, [20, 90]: PSNR of the compressed model's renders against those of the original.
                        Default 60 */
     bool lossless;  /* keep every bit of the model; `quality` is not used. Default false */
-    bool unless_lossless; /* leave a run that was trained with `lossless` (gbt_train_def) as it is. Default
-                             false */
-    const char *data; /* data set whose training cameras measure how much each parameter matters; NULL: the
-                         one it was trained on. Default NULL */
-    const char *json; /* also write the figures here; NULL: nowhere. Default NULL */
-    uint32_t cookie_; /* set by gbt_compress_def_default() */
+    bool after_training; /* `run` was trained just now: if with `lossless` (gbt_train_def), leave it as it is;
+                            do not repeat the warnings about its data set. Default false */
+    const char *data;    /* data set whose training cameras measure how much each parameter matters; NULL: the
+                            one it was trained on. Default NULL */
+    const char *json;    /* also write the figures here; NULL: nowhere. Default NULL */
+    uint32_t cookie_;    /* set by gbt_compress_def_default() */
 } gbt_compress_def;
 
 gbt_compress_def gbt_compress_def_default(void);

@@ -23,7 +23,9 @@ typedef struct gbt_evaluate_def {
                               their photos. Default false */
     const char *lpips;     /* .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score.
                               Default NULL */
-    uint32_t cookie_;      /* set by gbt_evaluate_def_default() */
+    bool after_training; /* `run` was trained just now: do not repeat the warnings about its data set. Default
+                            false */
+    uint32_t cookie_;    /* set by gbt_evaluate_def_default() */
 } gbt_evaluate_def;
 
 gbt_evaluate_def gbt_evaluate_def_default(void);

@@ -86,7 +86,7 @@ typedef struct gbt_train_def {
     bool overwrite; /* train from the start in a folder that holds a run; the old run is deleted once the data
                        have been read */
     bool lossless;  /* does not change training: it marks the run, so that gbt_compress() with
-                       `unless_lossless` leaves its model as it is. With `resume`, true sets the mark from now
+                       `after_training` leaves its model as it is. With `resume`, true sets the mark from now
                        on */
     double eval_at_seconds[GBT_TRAIN_MAX_EVALS]; /* compute held-out PSNR after these times, in seconds of
                                                     training; the clock stops meanwhile. With `resume`, the

@@ -229,10 +229,11 @@ static gbt_status train(const char *data, const char *run, const gbt_train_def *
     return status == GBT_OK ? GBT_OK : base_fail(err, status, "%s", why.text);
 }
 
-static gbt_status score(const char *run, const char *network, gbt_error *err)
+static gbt_status score(const char *run, const char *network, bool after_training, gbt_error *err)
 {
     gbt_evaluate_def evaluate = gbt_evaluate_def_default();
     evaluate.report = 0;
+    evaluate.after_training = after_training;
     evaluate.lpips = network;
     return gbt_evaluate(run, &evaluate, err);
 }
@@ -240,15 +241,16 @@ static gbt_status score(const char *run, const char *network, gbt_error *err)
 static gbt_status make_run(const char *data, const char *run, const gbt_train_def *def, const char *network,
                            const char *study_path, const char *settings, gbt_error *err)
 {
-    const gbt_compress_def compress = gbt_compress_def_default();
+    gbt_compress_def compress = gbt_compress_def_default();
     study_figures measured;
     char file[PATH_SIZE];
     GBT_TRY(file_join(file, sizeof file, run, "model.gbt", err));
     unlink(study_path);
+    compress.after_training = true;
     GBT_TRY(train(data, run, def, err));
     GBT_TRY(gbt_compress(run, &compress, file, NULL, err)); /* so that scores are of the file that `gbtrace
                                                                train` leaves */
-    GBT_TRY(score(run, network, err));
+    GBT_TRY(score(run, network, true, err));
     GBT_TRY(measure(run, &measured, err));
     remove_checkpoints(run);
     return save_measured(study_path, settings, &measured, err);
@@ -287,7 +289,7 @@ gbt_status study_runs_do(const char *data, const char *run, const gbt_train_def 
         GBT_TRY(is_scored_by(network, metrics_path, &scored, err));
         if (scored)
             return GBT_OK;
-        GBT_TRY(score(run, network, err));
+        GBT_TRY(score(run, network, false, err));
     } else {
         log_info("%s", run);
         GBT_TRY(make_run(data, run, def, network, study_path, settings, err));

@@ -20,11 +20,12 @@ gbt_status finish_run(const char *run, bool tensorboard, gbt_error *err)
         return status;
     if (snprintf(model, sizeof model, "%s/model.gbt", run) < (int)sizeof model) {
         gbt_compress_def small = gbt_compress_def_default();
-        small.unless_lossless = true;
+        small.after_training = true;
         status = gbt_compress(run, &small, model, NULL, err);
     }
     gbt_evaluate_def score = gbt_evaluate_def_default();
     score.tensorboard = tensorboard;
+    score.after_training = true;
     if (status == GBT_OK)
         status = gbt_evaluate(run, &score, err);
     gbt_release_run(hold);

@@ -75,8 +75,8 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
                  r->model.data_folder);
         return GBT_OK;
     }
-    loaded_run_close(r);
-    return loaded_run_open(run, def->data, 0, r, err);
+    r->data_is_known = def->after_training;
+    return loaded_run_open_views(run, def->data, 0, r, err);
 }
 
 static gbt_status check_stop(gbt_error *err)
@@ -241,7 +241,7 @@ static gbt_status compress(const char *run, const gbt_compress_def *def, const c
     compression c = {0};
     char path[4096];
     bool has_views = false, stays = false;
-    if (def->unless_lossless)
+    if (def->after_training)
         GBT_TRY(wants_lossless(run, &stays, err));
     if (stays)
         return GBT_OK;

@@ -67,7 +67,9 @@ static gbt_status open_run(const char *run, const gbt_evaluate_def *def, loaded_
                          def->json);
     if (!(def->downscale == 0 || (def->downscale >= 1 && def->downscale <= 64)))
         return base_fail(err, GBT_ERR_ARGUMENT, "downscale: %g (wanted 1 to 64)", def->downscale);
-    GBT_TRY(loaded_run_open(run, def->data, def->downscale, r, err));
+    GBT_TRY(loaded_run_open_model(run, r, err));
+    r->data_is_known = def->after_training;
+    GBT_TRY(loaded_run_open_views(run, def->data, def->downscale, r, err));
     GBT_TRY(loaded_run_preset(def->preset, &r->settings, err));
     const gbt_renderer trained = r->frame.draw.renderer;
     if (def->renderer != GBT_RENDERER_AS_TRAINED) {

@@ -25,6 +25,7 @@ typedef struct raw_view {
 } raw_view;
 
 typedef struct raw_scene {
+    bool is_known; /* no warnings while it is loaded (scene_load_known()) */
     size_t view_count, view_capacity;
     raw_view *views;
     size_t point_count;

@@ -73,7 +73,7 @@ static gbt_status read_model(const char *model, const char *ending, raw_scene *r
         status = raw_sort_views(raw, paths[1], err);
     for (int i = 0; i < 3; i++)
         mem_free(owned[i]);
-    if (status == GBT_OK)
+    if (status == GBT_OK && !raw->is_known)
         log_rigs(model, ending);
     return status;
 }
@@ -131,7 +131,7 @@ static gbt_status load_transforms(const char *path, const char *folder, raw_scen
     GBT_TRY(file_join(masks, sizeof masks, folder, "masks", err));
     for (size_t i = 0; i < raw->view_count; i++)
         masked = masked || raw->views[i].mask_path != NULL;
-    if (!masked && file_is_folder(masks))
+    if (!raw->is_known && !masked && file_is_folder(masks))
         log_warn("%s: not used: no frame of %s names a mask in it (mask_path)", masks, path);
     return raw_sort_views(raw, path, err);
 }
@@ -177,7 +177,7 @@ static gbt_status load_blender(const char *train, const char *folder, raw_scene 
         for (size_t v = first; v < raw->view_count; v++)
             raw->views[v].is_test = true;
         drop_repeated(raw, &dropped);
-        if (dropped > 0)
+        if (!raw->is_known && dropped > 0)
             log_warn("%s: photos also listed for training, so not held out: %zu", path, dropped);
         raw->has_split = raw->view_count > first;
     }
@@ -362,8 +362,10 @@ static gbt_status place(raw_scene *raw, scene *out, gbt_error *err)
     return GBT_OK;
 }
 
-static void warn_about(const char *path, const raw_scene *raw, const scene *s)
+static void warn_about(const char *path, const raw_scene *raw, const scene_split *split, const scene *s)
 {
+    if (s->listed_missing > 0)
+        log_warn("%s: names of missing photos, ignored: %zu", split->list_path, s->listed_missing);
     if (raw->points_dropped > 0)
         log_warn("%s: points with unusable coordinates, dropped: %zu", path, raw->points_dropped);
     if (raw->tracks_missing > 0)
@@ -387,11 +389,14 @@ static void warn_about(const char *path, const raw_scene *raw, const scene *s)
         log_warn("%s: only one view", path);
 }
 
-static gbt_status load(const char *path, const scene_split *split, bool recentres, scene *out, gbt_error *err)
+static gbt_status load(const char *path, const scene_split *split, bool is_known, bool recentres, scene *out,
+                       gbt_error *err)
 {
     const scene_split usual = {.kind = SCENE_SPLIT_AUTO};
+    if (split == NULL)
+        split = &usual;
     memset(out, 0, sizeof *out);
-    raw_scene raw = {0};
+    raw_scene raw = {.is_known = is_known};
     const char *source = "";
     gbt_status status = load_raw(path, &raw, &source, err);
     if (status == GBT_OK && recentres)
@@ -401,25 +406,29 @@ static gbt_status load(const char *path, const scene_split *split, bool recentre
     if (status == GBT_OK) {
         snprintf(out->source, sizeof out->source, "%s", source);
         out->folder = raw_copy_text(path, strlen(path), err);
-        status =
-            out->folder != NULL ? split_apply(split != NULL ? split : &usual, out, err) : GBT_ERR_NO_MEMORY;
+        status = out->folder != NULL ? split_apply(split, out, err) : GBT_ERR_NO_MEMORY;
     }
-    if (status == GBT_OK)
-        warn_about(path, &raw, out);
-    else
+    if (status != GBT_OK)
         scene_free(out);
+    else if (!is_known)
+        warn_about(path, &raw, split, out);
     raw_free(&raw);
     return status;
 }
 
 gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err)
 {
-    return load(path, split, true, out, err);
+    return load(path, split, false, true, out, err);
+}
+
+gbt_status scene_load_known(const char *path, const scene_split *split, scene *out, gbt_error *err)
+{
+    return load(path, split, true, true, out, err);
 }
 
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err)
 {
-    return load(path, split, false, out, err);
+    return load(path, split, false, false, out, err);
 }
 
 gbt_status scene_forget_points(scene *s, bool recentres, gbt_error *err)

@@ -59,6 +59,7 @@ typedef struct scene {
     char *held_out_list; /* [held_out_bytes] with SCENE_SPLIT_LIST, the contents of the list file; else NULL;
                             owned */
     size_t held_out_bytes;
+    size_t listed_missing; /* names in that file whose photo is missing */
     char *missing_lines; /* [missing_bytes] names of all views left out, each followed by a newline; owned */
     size_t missing_bytes;
 } scene;
@@ -101,6 +102,9 @@ gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err)
  * Threads: any, with distinct `out`.
  */
 gbt_status scene_load(const char *path, const scene_split *split, scene *out, gbt_error *err);
+
+/** scene_load() of a data set that the same command has loaded before: its warnings are not repeated. */
+gbt_status scene_load_known(const char *path, const scene_split *split, scene *out, gbt_error *err);
 
 /** scene_load() with origin 0: coordinates are the world's. Points are rounded to float. */
 gbt_status scene_load_in_place(const char *path, const scene_split *split, scene *out, gbt_error *err);

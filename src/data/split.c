@@ -8,7 +8,6 @@
 
 #include "base/fail.h"
 #include "base/file.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "data/number.h"
 
@@ -85,7 +84,7 @@ static bool is_missing(const scene *s, const char *name)
 /* Mark the views named in the list. `bytes` is modified: every line becomes a string of its own. */
 static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *path, gbt_error *err)
 {
-    size_t line = 0, missing = 0;
+    size_t line = 0;
     for (char *at = bytes + file_mark_bytes(bytes, size); at < bytes + size;) {
         char *end = memchr(at, '\n', (size_t)(bytes + size - at));
         end = end != NULL ? end : bytes + size;
@@ -103,12 +102,10 @@ static gbt_status mark_listed(scene *s, char *bytes, size_t size, const char *pa
                                  "%s:%zu: no image of the data set has this name: %.200s", path, line, at);
             if (view != NULL)
                 view->is_test = true;
-            missing += view == NULL;
+            s->listed_missing += view == NULL;
         }
         at = next;
     }
-    if (missing > 0)
-        log_warn("%s: names of missing photos, ignored: %zu", path, missing);
     return GBT_OK;
 }
 

@@ -228,7 +228,8 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
                          run, out->data.tried);
     if (data == NULL && out->data.moved)
         log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
-    GBT_TRY(scene_load(data != NULL ? data : out->data.place, &split, &out->scene, err));
+    GBT_TRY((out->data_is_known ? scene_load_known : scene_load)(data != NULL ? data : out->data.place,
+                                                                 &split, &out->scene, err));
     if (!seen_points_match_cameras(&out->scene)) /* as training does */
         GBT_TRY(scene_forget_points(&out->scene, false, err));
     scene_set_alpha(&out->scene, out->def.alpha);

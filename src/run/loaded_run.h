@@ -26,6 +26,8 @@ typedef struct loaded_run {
     int reduced;           /* reduction that a result folder states (data/result_folder.h), then both others
                               are 0; otherwise 0 */
     run_data data;         /* where its data set is */
+    bool data_is_known;    /* set it before loaded_run_open_views() after the data set was trained on: its
+                              warnings are not repeated */
     scene scene;           /* cameras and points in the model's local coordinates */
     bool poses_refined;    /* the cameras are those of RUN/poses.json */
     bool held_out_aligned; /* with poses_refined: as RUN/poses.json says (train/pose_file.h) */

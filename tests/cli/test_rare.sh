@@ -97,6 +97,13 @@ report $? "and writes its model" "$(cat err)"
     grep -q '^{"schema": 1, "width": 32, "height": 24, "psnr": [0-9.]*, "ssim": [0-9.]*, "ssim_interior": [0-9.]*, "flip": [0-9.e-]*}$' scores &&
     [ "$(sed 's/.*"psnr": \([0-9]*\).*/\1/' scores)" -ge 90 ]
 report $? "render in double, and compare as JSON" "$(cat err out; ls shown; cat scores)"
+cp -r made gaps && rm gaps/images/0001.png && mkdir gaps/masks && printf '0001.png\n0003.png\n' >gaps/list && "$program" train gaps -o gaps-run --eval-split list=gaps/list --iterations 3 --quiet >out 2>err &&
+    [ "$(grep '^warning: ' err | sed 's/: [0-9].*//')" = "warning: gaps/list: names of missing photos, ignored
+warning: gaps: views left out because their photo is missing
+warning: gaps: photos without a mask, used completely" ]
+report $? "training warns about its data once" "$(cat err out)"
+"$program" eval gaps-run >out 2>err && [ "$(grep -c '^warning: ' err)" = 3 ]
+report $? "scoring alone warns, too" "$(cat err out)"
 mkdir floats && cp -r made/* floats && cp shown/0000.exr floats/images/0001.png &&
     holds "EXR photos are told" 0 '^warning: floats: EXR photos, used without tone mapping, values above 1 clipped: 1$' train floats -o floats/run --iterations 3
 "$program" train made -o splats --renderer raster --iterations 3 --quiet >out 2>err && ! "$program" render splats -o none --outputs depth >>out 2>>err &&

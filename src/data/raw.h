@@ -42,6 +42,7 @@ typedef struct raw_scene {
     bool has_split;            /* the data set says which views are held out */
     size_t angles_disagreeing; /* cameras of a transforms.json whose camera_angle_x contradicts fl_x; fl_x is
                                   used */
+    bool has_odd_transform;    /* applied_transform of a transforms.json is not a rotation with a scale */
     char *missing_lines; /* the names of all views left out, each followed by a newline; NULL: none; owned */
     size_t missing_bytes, missing_capacity;
 } raw_scene;

@@ -385,6 +385,11 @@ static void warn_about(const char *path, const raw_scene *raw, const scene_split
     if (raw->angles_disagreeing > 0)
         log_warn("%s: frames whose camera_angle_x contradicts fl_x, which is used: %zu", path,
                  raw->angles_disagreeing);
+    if (raw->has_odd_transform)
+        log_warn(
+            "%s: applied_transform is not a rotation with a scale; poses and points are used as they are, "
+            "as with any other",
+            path);
     if (raw->view_count == 1)
         log_warn("%s: only one view", path);
 }

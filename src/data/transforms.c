@@ -160,6 +160,10 @@ static gbt_status read_root(const source_file *file, const json_t *root, const c
         return base_fail(err, GBT_ERR_IO, "%s: none of the %zu photos exists, the first is %.200s",
                          file->name, out->photos_missing, first);
     }
+    static const char applied[] = "applied_transform";
+    const transforms_frame top = {.file = file, .frame = root, .top = root};
+    if (transforms_value(root, applied) != NULL && !transforms_is_similarity(&top, applied))
+        out->has_odd_transform = true;
     GBT_TRY(read_split(file, root, out, err));
     const json_t *points = transforms_value(root, "ply_file_path");
     if (points == NULL)

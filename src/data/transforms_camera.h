@@ -46,4 +46,7 @@ gbt_status transforms_camera(const transforms_frame *s, const char *photo, gbt_c
     shutter and motion. */
 gbt_status transforms_pose(const transforms_frame *s, gbt_camera *camera, gbt_error *err);
 
+/** Whether s->frame holds, under `key`, a rotation with a scale (> 0) and a translation. */
+bool transforms_is_similarity(const transforms_frame *s, const char *key);
+
 #endif

@@ -55,6 +55,18 @@ static gbt_status read_matrix(const transforms_frame *s, const char *key, double
     return GBT_OK;
 }
 
+bool transforms_is_similarity(const transforms_frame *s, const char *key)
+{
+    double m[4][4], rotation[9];
+    gbt_error ignored = {0};
+    if (read_matrix(s, key, m, &ignored) != GBT_OK)
+        return false;
+    const double scale = sqrt(dvec_dot(m[0], m[0]));
+    for (int i = 0; i < 9; i++)
+        rotation[i] = m[i / 3][i % 3] / scale;
+    return scale > 0 && dmat_is_rotation(rotation, 1e-3);
+}
+
 static gbt_status read_pose(const transforms_frame *s, const char *key, gbt_camera *camera, gbt_error *err)
 {
     double m[4][4], rotation[9], worst = 0;

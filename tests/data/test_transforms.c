@@ -397,6 +397,36 @@ static void rolling_shutters(void **state)
     }
 }
 
+/* A rotation with any scale passes; everything else is reported, although the key is not used. */
+static void odd_transforms_are_noticed(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *matrix;
+        bool odd;
+    } cases[] = {
+        {"null", false},
+        {"[[1,0,0,0],[0,1,0,0],[0,0,1,0]]", false},
+        {"[[0,2,0,5],[2,0,0,6],[0,0,-2,7],[0,0,0,1]]", false},
+        {"[[0,0,0,0],[0,0,0,0],[0,0,0,0]]", true},
+        {"[[1,0,0,0],[1,0,0,0],[0,0,1,0]]", true},  /* singular */
+        {"[[1,0,0,0],[0,2,0,0],[0,0,1,0]]", true},  /* stretched */
+        {"[[1,0,0,0],[0,1,0,0],[0,0,-1,0]]", true}, /* a reflection */
+        {"[[1,0,0],[0,1,0],[0,0,1]]", true},
+        {"3", true},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char text[512];
+        raw_scene raw = {0};
+        char *points_name = NULL;
+        snprintf(text, sizeof text, "%s\"applied_transform\": %s, %s", SIZED, cases[i].matrix, FRAMES);
+        assert_ok(read_json(text, strlen(text), &raw, &points_name, &assert_ok_err_));
+        if (raw.has_odd_transform != cases[i].odd)
+            fail_msg("%s", cases[i].matrix);
+        raw_free(&raw);
+    }
+}
+
 static void missing_frames_are_counted(void **state)
 {
     (void)state;
@@ -431,6 +461,7 @@ int main(void)
         cmocka_unit_test(turned_axes),
         cmocka_unit_test(deep_nesting),
         cmocka_unit_test(missing_frames_are_counted),
+        cmocka_unit_test(odd_transforms_are_noticed),
         cmocka_unit_test(rolling_shutters),
     };
     if (folder_make(NULL) != 0)

@@ -85,6 +85,8 @@ static gbt_status open_folder(const char *run, const gbt_train_def *def, const r
                          "%.1000s: already holds a run (continue it with `resume`, replace it with "
                          "`overwrite`, or choose another folder)",
                          run);
+    if (!def->resume && !def->overwrite)
+        GBT_TRY(old_run_check_foreign(run, err));
     GBT_TRY(file_make_folder(checkpoints, err));
     GBT_TRY(file_check_folder_creatable(run, err));
     return file_check_folder_creatable(checkpoints, err);
@@ -292,13 +294,13 @@ static gbt_status write_settings(const trainer *t, const char *run, const run_pa
 {
     char config[CONFIG_TEXT_SIZE], split[RUN_SPLIT_TEXT_SIZE];
     gbt_train_def def = t->def;
+    GBT_TRY(run_data_save(run, t->scene.folder, err)); /* first: old_run_check_foreign() */
     GBT_TRY(run_split_save(run, &t->scene, err));
     GBT_TRY(run_split_text(run, def.eval_split, split, err));
     if (strlen(split) < SETTING_TEXT_SIZE)
         def.eval_split = split;
     config_text(&def, t->scene.folder, config, sizeof config);
-    GBT_TRY(file_write_atomic(paths->config, config, strlen(config), err));
-    return run_data_save(run, t->scene.folder, err);
+    return file_write_atomic(paths->config, config, strlen(config), err);
 }
 
 /* Save everything before the held-out photos are aligned, because alignment takes time and can be

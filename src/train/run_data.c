@@ -10,8 +10,6 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-static const char places_name[] = "data_places";
-
 /* Relative path from one absolute folder to another; false when it does not fit into `out`. */
 static bool relative_path(const char *from, const char *to, char *out, size_t size)
 {
@@ -35,7 +33,7 @@ static bool relative_path(const char *from, const char *to, char *out, size_t si
 gbt_status run_data_save(const char *run, const char *data, gbt_error *err)
 {
     char path[RUN_DATA_PATH_SIZE], relative[RUN_DATA_PATH_SIZE], text[3 * RUN_DATA_PATH_SIZE];
-    GBT_TRY(file_join(path, sizeof path, run, places_name, err));
+    GBT_TRY(file_join(path, sizeof path, run, RUN_DATA_NAME, err));
     char *run_place = realpath(run, NULL), *data_place = realpath(data, NULL);
     gbt_status status = GBT_OK;
     if (run_place != NULL && data_place != NULL &&
@@ -80,7 +78,7 @@ void run_data_find(const char *run, const char *named, run_data *out)
         char *slash = strrchr(folder, '/');
         snprintf(slash != NULL ? slash + 1 : folder, 2, "%s", slash != NULL ? "" : ".");
     }
-    if (file_join(path, sizeof path, folder, places_name, NULL) == GBT_OK && file_exists(path) &&
+    if (file_join(path, sizeof path, folder, RUN_DATA_NAME, NULL) == GBT_OK && file_exists(path) &&
         file_read(path, &bytes, &byte_count, NULL) == GBT_OK) {
         char *rest = (char *)bytes;
         const char *saved = take_line(&rest), *absolute = take_line(&rest), *relative = take_line(&rest);

@@ -9,6 +9,8 @@
 
 #include "gbtrace/status.h"
 
+#define RUN_DATA_NAME "data_places"
+
 enum { RUN_DATA_PATH_SIZE = 4096 };
 
 typedef struct run_data {

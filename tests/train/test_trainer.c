@@ -1068,6 +1068,39 @@ static void a_run_is_overwritten_only_when_asked(void **state)
     assert_same_file(in_folder("anew/model.gbt"), in_folder("kept/model.gbt"));
 }
 
+/* Files that a run would replace are refused unless they are a run's; pipes are not replaced. */
+static void foreign_files_are_kept(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"config", "report.html", "log.csv", "metrics.json", "poses.json"};
+    gbt_train_def def = run_def();
+    char says[128];
+    def.stop_at_step = 2;
+    assert_ok(file_make_folder(in_folder("foreign"), NULL));
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        const char *path = in_folder("foreign/%s", names[i]);
+        assert_ok(file_write_atomic(path, "theirs", 6, NULL));
+        snprintf(says, sizeof says, "foreign/%s: would be replaced, but its folder holds no run", names[i]);
+        train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_ARGUMENT, says);
+        assert_false(file_exists(in_folder("foreign/checkpoints")));
+        file_bytes after = read_bytes(path);
+        assert_int_equal(after.count, 6);
+        assert_memory_equal(after.data, "theirs", 6);
+        mem_free(after.data);
+        assert_int_equal(unlink(path), 0);
+    }
+    assert_ok(file_write_atomic(in_folder("foreign/config"), "theirs", 6, NULL));
+    def.overwrite = true;
+    train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    def.overwrite = false; /* without its checkpoint the folder still says that it was a run */
+    assert_int_equal(unlink(in_folder("foreign/checkpoints/last.gbt")), 0);
+    assert_int_equal(unlink(in_folder("foreign/model.gbt")), 0);
+    train_fails(tiny, in_folder("foreign"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+    assert_ok(file_make_folder(in_folder("piped"), NULL));
+    assert_int_equal(mkfifo(in_folder("piped/metrics.json"), 0600), 0);
+    train_fails(tiny, in_folder("piped"), &def, GBT_ERR_INTERRUPTED, "after step 2");
+}
+
 /* A run has read its photos when it starts; one that is resumed reads them again. */
 static void a_vanished_photo_is_named(void **state)
 {
@@ -2038,6 +2071,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(data_without_training_photos_is_refused),
         cmocka_unit_test(validation_needs_no_held_out_photo),
         cmocka_unit_test(a_run_is_overwritten_only_when_asked),
+        cmocka_unit_test(foreign_files_are_kept),
         cmocka_unit_test(a_vanished_photo_is_named),
         cmocka_unit_test(a_full_disk_leaves_the_old_checkpoint),
         cmocka_unit_test(poses_stay_with_their_model),

@@ -83,8 +83,8 @@ typedef struct gbt_comparison {
  * the original.
  *
  * @param network [in] .safetensors file of a network for LPIPS (docs/metrics.md); NULL: no such score
- * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ, or too small for the network), GBT_ERR_IO, GBT_ERR_FORMAT,
- *         GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (sizes differ, or too small for the network), GBT_ERR_IO, GBT_ERR_FORMAT
+ *         (also for a value that is not finite), GBT_ERR_NO_MEMORY
  *
  * Threads: any, with distinct `out`.
  */

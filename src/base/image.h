@@ -45,10 +45,10 @@ gbt_status image_fit(image *im, int width, int height, int channels, gbt_error *
 gbt_status image_read(const char *path, image *out, gbt_error *err);
 
 /**
- * image_read() with a mask of the pixels whose non-finite values it replaced by 0.
+ * image_read() with a mask of the pixels whose non-finite values it replaced by 0, without the warning.
  *
- * @param valid [out] may be NULL; `*valid` is NULL when every value is finite, else [height][width]: 0 for
- *                    pixels with a value that is not; free with mem_free()
+ * @param valid [out] `*valid` is NULL when every value is finite, else [height][width]: 0 for pixels with a
+ *                    value that is not; free with mem_free(). NULL: as image_read()
  */
 gbt_status image_read_valid(const char *path, image *out, unsigned char **valid, gbt_error *err);
 

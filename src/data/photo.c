@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/image_header.h"
+#include "base/log.h"
 #include "base/memory.h"
 #include "data/mask.h"
 #include "data/photo_size.h"
@@ -45,10 +46,20 @@ static gbt_status is_premultiplied(const char *path, const image *stored, bool *
     return GBT_OK;
 }
 
+static void warn_of_pixels(const char *path, const image *stored, const unsigned char *valid)
+{
+    size_t bad = 0;
+    for (size_t i = 0; i < (size_t)stored->width * (size_t)stored->height; i++)
+        bad += !valid[i];
+    log_warn("%s: %zu pixels with values that are not finite are left out of training and scores", path, bad);
+}
+
 /* Read a photo, check its aspect ratio and apply its mask; `valid` is optional (NULL). */
 static gbt_status read_stored(const scene_view *view, image *stored, unsigned char **valid, gbt_error *err)
 {
     GBT_TRY(image_read_valid(view->path, stored, valid, err));
+    if (valid != NULL && *valid != NULL)
+        warn_of_pixels(view->path, stored, *valid);
     if (photo_same_aspect(stored->width, stored->height, view->camera.width, view->camera.height))
         return valid != NULL ? mask_apply(view, stored, valid, err) : GBT_OK;
     return base_fail(

@@ -6,14 +6,32 @@
 
 #include "base/fail.h"
 #include "base/image.h"
+#include "base/memory.h"
 #include "eval/lpips.h"
 #include "gbtrace/evaluate.h"
 #include "image/metrics.h"
 
+/* Rounding would make a number of what is none, and two pictures equal that are not. */
+static gbt_status check_valid(const char *path, const unsigned char *valid, size_t width, gbt_error *err)
+{
+    size_t at = 0;
+    if (valid == NULL)
+        return GBT_OK;
+    while (valid[at])
+        at++;
+    return base_fail(err, GBT_ERR_FORMAT,
+                     "%s: a value that is not finite at pixel %zu, %zu (wanted finite values)", path,
+                     at % width, at / width);
+}
+
 /* Read an image as three channels, rounded to 8 bit. */
 static gbt_status read_colors(const char *path, image *out, gbt_error *err)
 {
-    GBT_TRY(image_read(path, out, err));
+    unsigned char *valid;
+    GBT_TRY(image_read_valid(path, out, &valid, err));
+    const gbt_status status = check_valid(path, valid, (size_t)out->width, err);
+    mem_free(valid);
+    GBT_TRY(status);
     const size_t pixels = (size_t)out->width * (size_t)out->height, stored = (size_t)out->channels;
     for (size_t i = 0; i < pixels; i++)
         for (size_t c = 0; c < 3; c++)
@@ -72,7 +90,6 @@ gbt_status gbt_compare_images(const char *path, const char *reference, const cha
     return status;
 }
 
-/* Rounding would make a number of what is none, and two pictures equal that are not. */
 static gbt_status check_finite(const float *const pictures[2], int width, int height, gbt_error *err)
 {
     for (int i = 0; i < 2; i++)

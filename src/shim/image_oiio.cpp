@@ -259,7 +259,7 @@ gbt_status read_samples(const char *path, opened_image *o, OIIO::TypeDesc type, 
     return GBT_OK;
 }
 
-/* Replace values that are not finite by 0; `valid`, if wanted, marks the pixels without such values. */
+/* Replace values that are not finite by 0. `valid` marks the pixels without such values; NULL: warn. */
 gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, gbt_error *err)
 {
     const size_t pixels = size_t(out->width) * size_t(out->height), channels = size_t(out->channels);
@@ -278,9 +278,8 @@ gbt_status drop_not_finite(const char *path, image *out, unsigned char **valid, 
         out->pixels[i] = 0;
         bad++;
     }
-    if (bad > 0)
-        log_warn("%s: %zu values that are not finite %s", path, bad,
-                 valid != nullptr ? "count in no loss" : "were read as 0");
+    if (bad > 0 && valid == nullptr)
+        log_warn("%s: %zu values that are not finite were read as 0", path, bad);
     return GBT_OK;
 }
 

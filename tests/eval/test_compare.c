@@ -131,13 +131,21 @@ static void what_cannot_be_compared(void **state)
     (void)state;
     write_noise("small.png", 8, 8, 1);
     write_noise("wide.png", 9, 8, 1);
+    image spoiled = noise(8, 8, 3, 1);
+    spoiled.pixels[3 * (8 * 2 + 5) + 1] = NAN;
+    assert_ok(image_write(in_folder("spoiled.exr"), &spoiled, NULL));
+    image_free(&spoiled);
     const struct {
         const char *a, *b;
         gbt_status status;
         const char *says;
-    } cases[] = {{"small.png", "wide.png", GBT_ERR_ARGUMENT, "8 x 8"},
-                 {"none.png", "wide.png", GBT_ERR_IO, "none.png"},
-                 {"wide.png", "none.png", GBT_ERR_IO, "none.png"}};
+    } cases[] = {
+        {"small.png", "wide.png", GBT_ERR_ARGUMENT, "8 x 8"},
+        {"none.png", "wide.png", GBT_ERR_IO, "none.png"},
+        {"wide.png", "none.png", GBT_ERR_IO, "none.png"},
+        {"spoiled.exr", "small.png", GBT_ERR_FORMAT, "spoiled.exr: a value that is not finite at pixel 5, 2"},
+        {"small.png", "spoiled.exr", GBT_ERR_FORMAT,
+         "spoiled.exr: a value that is not finite at pixel 5, 2"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         gbt_comparison c;
         gbt_error err = {0};

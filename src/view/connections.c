@@ -17,11 +17,22 @@ static connection_entry *find(const connections *c, const struct MHD_Connection 
     return NULL;
 }
 
+/* The request of a connection has arrived: set the next deadline. */
 static void set_until(connections *c, const struct MHD_Connection *connection, double until)
 {
     connection_entry *entry = find(c, connection);
-    if (entry != NULL)
-        entry->until = until;
+    if (entry == NULL)
+        return;
+    entry->until = until;
+    entry->expects_request = false;
+}
+
+/* libmicrohttpd then closes the connection. */
+static void shut(connection_entry *entry)
+{
+    shutdown(entry->socket, SHUT_RDWR);
+    entry->until = (double)INFINITY;
+    entry->expects_request = false;
 }
 
 void connections_expect_request(connections *c, struct MHD_Connection *connection)
@@ -31,8 +42,20 @@ void connections_expect_request(connections *c, struct MHD_Connection *connectio
         *entry = (connection_entry){
             .connection = connection,
             .socket = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd};
-    if (entry != NULL)
-        entry->until = clock_wall() + c->request_seconds;
+    if (entry == NULL)
+        return;
+    entry->until = clock_wall() + c->request_seconds;
+    entry->expects_request = true;
+    connection_entry *oldest = entry;
+    int expecting = 0;
+    for (int i = 0; i < c->capacity; i++)
+        if (c->entries[i].connection != NULL && c->entries[i].expects_request) {
+            expecting++;
+            if (c->entries[i].until < oldest->until)
+                oldest = &c->entries[i];
+        }
+    if (expecting > c->expecting_max)
+        shut(oldest);
 }
 
 void connections_hold(connections *c, struct MHD_Connection *connection)
@@ -56,10 +79,8 @@ void connections_shut_slow(connections *c)
 {
     const double now = clock_wall();
     for (int i = 0; i < c->capacity; i++)
-        if (c->entries[i].connection != NULL && now > c->entries[i].until) {
-            shutdown(c->entries[i].socket, SHUT_RDWR);
-            c->entries[i].until = (double)INFINITY;
-        }
+        if (c->entries[i].connection != NULL && now > c->entries[i].until)
+            shut(&c->entries[i]);
 }
 
 bool connections_has_left(const connections *c, const struct MHD_Connection *connection)

@@ -10,25 +10,27 @@
 typedef struct connection_entry {
     struct MHD_Connection *connection; /* NULL: unused entry */
     int socket;
-    double until; /* deadline by clock_wall(); infinite while the server works on its request */
+    double until;         /* deadline by clock_wall(); infinite while the server works on its request */
+    bool expects_request; /* no whole request has arrived yet */
 } connection_entry;
 
 /** All connections of a server; used with the server's lock held. */
 typedef struct connections {
     connection_entry *entries;
-    int capacity;
+    int capacity, expecting_max; /* expecting_max: most connections without a whole request */
     double request_seconds,
         answer_seconds; /* time limits for sending a whole request, and for receiving a whole answer */
 } connections;
 
-/** A connection was opened, or waits for its next request: the client must send one in time. */
+/** A connection was opened, or waits for its next request: the client must send one in time. If more than
+    `expecting_max` do, the one that has waited longest is shut down. */
 void connections_expect_request(connections *c, struct MHD_Connection *connection);
 /** Its request is complete: no deadline while the server works on it. */
 void connections_hold(connections *c, struct MHD_Connection *connection);
 void connections_expect_taking(connections *c, struct MHD_Connection *connection);
 void connections_forget(connections *c, struct MHD_Connection *connection);
 
-/** Shut down the sockets whose deadline has passed; libmicrohttpd then closes the connections. */
+/** Shut down the sockets whose deadline has passed. */
 void connections_shut_slow(connections *c);
 
 /** Whether the client has closed its side. */

@@ -330,6 +330,7 @@ gbt_status server_start(const guard *g, int port, const char *log_path, server *
     pthread_mutex_init(&s->lock, NULL);
     s->clients = (connections){.entries = s->client_entries,
                                .capacity = SERVER_CONNECTIONS,
+                               .expecting_max = SERVER_EXPECTING_CONNECTIONS,
                                .request_seconds = SERVER_REQUEST_SECONDS,
                                .answer_seconds = SERVER_ANSWER_SECONDS};
     errno = 0;

@@ -10,12 +10,13 @@
 #include "view/guard.h"
 #include "view/request.h"
 
-/** Fixed limits: connections in total and per client address; waiting jobs; bytes of a request's headers;
-    seconds for a whole request, counted from the start of the connection or the end of the last answer;
-    seconds to receive a whole answer. */
+/** Fixed limits: connections in total, per client address, and without a whole request; waiting jobs; bytes
+    of a request's headers; seconds for a whole request, counted from the start of the connection or the end
+    of the last answer; seconds to receive a whole answer. */
 enum {
     SERVER_CONNECTIONS = 32,
     SERVER_ADDRESS_CONNECTIONS = 24,
+    SERVER_EXPECTING_CONNECTIONS = 16,
     SERVER_JOBS = 16,
     SERVER_HEAD_BYTES = 32 * 1024,
     SERVER_REQUEST_SECONDS = 10,

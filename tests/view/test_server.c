@@ -373,19 +373,48 @@ static void who_does_not_take_an_answer_is_shut(void **state)
     server_stop(other);
 }
 
+/* With as many jobs as may wait, one address has room for some connections without a request. */
 static void one_address_leaves_room_for_others(void **state)
 {
     (void)state;
     server *other;
-    int fd[SERVER_CONNECTIONS];
+    enum { ROOM = SERVER_ADDRESS_CONNECTIONS - SERVER_JOBS };
+    int asking[SERVER_JOBS], fd[ROOM + 1];
     assert_ok(server_start(&here, 0, "", &other, NULL));
-    for (int i = 0; i < SERVER_CONNECTIONS; i++)
+    for (int i = 0; i < SERVER_JOBS; i++)
+        asking[i] = http_ask(server_port(other), "/scene");
+    settle(server_port(other));
+    for (int i = 0; i <= ROOM; i++)
         fd[i] = http_connect(server_port(other));
-    /* The last ones are closed unasked, the first stay open. */
+    /* The last one is closed unasked, the first stay open. */
     char byte;
-    assert_int_equal(recv(fd[SERVER_CONNECTIONS - 1], &byte, 1, 0), 0);
+    assert_int_equal(recv(fd[ROOM], &byte, 1, 0), 0);
     assert_true(recv(fd[0], &byte, 1, MSG_DONTWAIT) < 0);
-    for (int i = 0; i < SERVER_CONNECTIONS; i++)
+    for (int i = 0; i <= ROOM; i++)
+        close(fd[i]);
+    for (int i = 0; i < SERVER_JOBS; i++)
+        answer_with(other, wait_for_job(other), "here");
+    for (int i = 0; i < SERVER_JOBS; i++)
+        expect(asking[i], 200, "here");
+    server_stop(other);
+}
+
+/* Who asks is answered, although hundreds connect and send nothing; so is who had asked before. */
+static void clients_that_send_nothing_make_room(void **state)
+{
+    (void)state;
+    enum { SILENT = 300 };
+    server *other;
+    int fd[SILENT];
+    assert_ok(server_start(&here, 0, "", &other, NULL));
+    const int before = http_ask(server_port(other), "/scene");
+    server_job *job = wait_for_job(other);
+    for (int i = 0; i < SILENT; i++)
+        fd[i] = http_connect(server_port(other));
+    settle(server_port(other));
+    answer_with(other, job, "here");
+    expect(before, 200, "here");
+    for (int i = 0; i < SILENT; i++)
         close(fd[i]);
     server_stop(other);
 }
@@ -550,6 +579,7 @@ int main(void)
         cmocka_unit_test(slow_clients_are_shut),
         cmocka_unit_test(who_does_not_take_an_answer_is_shut),
         cmocka_unit_test(one_address_leaves_room_for_others),
+        cmocka_unit_test(clients_that_send_nothing_make_room),
         cmocka_unit_test(it_is_known_that_nobody_waits),
         cmocka_unit_test(a_signal_ends_what_is_made),
         cmocka_unit_test(the_end_answers_all),

@@ -65,11 +65,6 @@ static void put(FILE *out, char before, double value)
     fprintf(out, "%c%s", before, text);
 }
 
-static void print_header(const gbt_query_def *def, FILE *out)
-{
-    fprintf(out, "query,rank,ball,%s,x,y,z,radius\n", def->kind == GBT_QUERY_CROSSED ? "t" : "distance");
-}
-
 static void print_answer(FILE *out, const gbt_balls_view *v, size_t query, size_t rank, uint32_t ball,
                          double value)
 {
@@ -81,33 +76,36 @@ static void print_answer(FILE *out, const gbt_balls_view *v, size_t query, size_
     putc('\n', out);
 }
 
-static gbt_status nearest(const gbt_balls *balls, const gbt_query_def *def, const double *point, size_t count,
-                          FILE *out, gbt_error *err)
+static void print(const gbt_balls *balls, const gbt_query_def *def, const gbt_answers *a, FILE *out)
 {
     const gbt_balls_view v = gbt_balls_get(balls);
-    const size_t k = (size_t)def->k < v.count ? (size_t)def->k : v.count;
-    if (k == 0) {
-        print_header(def, out);
-        return GBT_OK;
-    }
-    uint32_t *index = mem_alloc(count, k * sizeof *index, "answers", err);
-    double *distance = mem_alloc(count, k * sizeof *distance, "answers", err);
-    const gbt_status status = index == NULL || distance == NULL
-                                  ? GBT_ERR_NO_MEMORY
-                                  : gbt_balls_nearest(balls, point, count, k, false, index, distance, err);
-    if (status == GBT_OK)
-        print_header(def, out);
-    for (size_t i = 0; i < count * k && status == GBT_OK; i++)
-        print_answer(out, &v, i / k, i % k, index[i], distance[i]);
-    mem_free(index);
-    mem_free(distance);
-    return status;
+    fprintf(out, "query,rank,ball,%s,x,y,z,radius\n", def->kind == GBT_QUERY_CROSSED ? "t" : "distance");
+    for (size_t i = 0; i < a->count; i++)
+        for (size_t at = a->first[i]; at < a->first[i + 1]; at++)
+            print_answer(out, &v, i, at - a->first[i], a->index[at], a->value[at]);
+}
+
+/* ---- the queries ---- */
+
+static gbt_status nearest(const gbt_balls *balls, const gbt_query_def *def, const double *point, size_t count,
+                          gbt_answers *out, gbt_error *err)
+{
+    const size_t balls_count = gbt_balls_get(balls).count,
+                 k = (size_t)def->k < balls_count ? (size_t)def->k : balls_count;
+    out->first = mem_alloc(count + 1, sizeof *out->first, "answers", err);
+    out->index = mem_alloc(count, k * sizeof *out->index, "answers", err);
+    out->value = mem_alloc(count, k * sizeof *out->value, "answers", err);
+    if (out->first == NULL || out->index == NULL || out->value == NULL)
+        return GBT_ERR_NO_MEMORY;
+    out->count = count;
+    for (size_t i = 0; i <= count; i++)
+        out->first[i] = k * i;
+    return k == 0 ? GBT_OK : gbt_balls_nearest(balls, point, count, k, false, out->index, out->value, err);
 }
 
 static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const query_rows *rows,
-                        const double *point, FILE *out, gbt_error *err)
+                        const double *point, gbt_answers *out, gbt_error *err)
 {
-    const gbt_balls_view v = gbt_balls_get(balls);
     const size_t n = rows->count;
     const bool ray = def->kind == GBT_QUERY_CROSSED;
     double *direction = ray ? take(rows, 3, 3, err) : NULL;
@@ -115,7 +113,6 @@ static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const 
                     : rows->width == 8 ? take(rows, 6, 1, err)
                                        : mem_alloc(n, sizeof *first, "queries", err);
     double *second = rows->width == 8 ? take(rows, 7, 1, err) : mem_alloc(n, sizeof *second, "queries", err);
-    gbt_answers a = {0};
     gbt_status status =
         first == NULL || second == NULL || (ray && direction == NULL) ? GBT_ERR_NO_MEMORY : GBT_OK;
     for (size_t i = 0; i < n && status == GBT_OK; i++) {
@@ -125,16 +122,11 @@ static gbt_status lists(const gbt_balls *balls, const gbt_query_def *def, const 
             second[i] = HUGE_VAL;
     }
     if (status == GBT_OK)
-        status = ray ? gbt_balls_crossed(balls, point, direction, first, second, n, &a, err)
-                 : def->kind == GBT_QUERY_WITHIN     ? gbt_balls_within(balls, point, first, n, &a, err)
-                 : def->kind == GBT_QUERY_CONTAINING ? gbt_balls_containing(balls, point, n, &a, err)
-                                                     : gbt_balls_overlapping(balls, point, first, n, &a, err);
-    if (status == GBT_OK)
-        print_header(def, out);
-    for (size_t i = 0; i < n && status == GBT_OK; i++)
-        for (size_t at = a.first[i]; at < a.first[i + 1]; at++)
-            print_answer(out, &v, i, at - a.first[i], a.index[at], a.value[at]);
-    gbt_answers_free(&a);
+        status = ray ? gbt_balls_crossed(balls, point, direction, first, second, n, out, err)
+                 : def->kind == GBT_QUERY_WITHIN ? gbt_balls_within(balls, point, first, n, out, err)
+                 : def->kind == GBT_QUERY_CONTAINING
+                     ? gbt_balls_containing(balls, point, n, out, err)
+                     : gbt_balls_overlapping(balls, point, first, n, out, err);
     mem_free(direction);
     mem_free(first);
     mem_free(second);
@@ -149,9 +141,13 @@ static gbt_status answer(const gbt_balls *balls, const gbt_query_def *def, const
     if (point == NULL)
         return GBT_ERR_NO_MEMORY;
     gbt_error why = {0};
+    gbt_answers answers = {0};
     const gbt_status status = def->kind == GBT_QUERY_NEAREST
-                                  ? nearest(balls, def, point, rows->count, out, &why)
-                                  : lists(balls, def, rows, point, out, &why);
+                                  ? nearest(balls, def, point, rows->count, &answers, &why)
+                                  : lists(balls, def, rows, point, &answers, &why);
+    if (status == GBT_OK)
+        print(balls, def, &answers, out);
+    gbt_answers_free(&answers);
     mem_free(point);
     if (status == GBT_ERR_ARGUMENT)
         return base_fail(err, GBT_ERR_FORMAT, "%.400s: %s", def->at != NULL ? "at" : def->from, why.text);

@@ -54,15 +54,16 @@ static double text_width(const char *label, bool large)
     return (large ? 8.4 : 6.3) * (double)strlen(label);
 }
 
-/* The first free position of a label around a mark of the given radius: right, left, above, below, then the
-   corners. */
+/* The first free position of a label around a mark of the given radius: right, left, above, below, the
+   corners, then those above and below a line farther away: colours still say whose label it is. */
 static bool find_room(plane *p, double x, double y, double radius, const char *label, bool large,
                       double *at_x, double *at_y)
 {
     static const int sides[8][2] = {{1, 0}, {-1, 0}, {0, -1}, {0, 1}, {1, -1}, {-1, -1}, {1, 1}, {-1, 1}};
     const double width = text_width(label, large), height = large ? 15 : 12, gap = radius + 3;
-    for (int i = 0; i < 8; i++) {
-        const double middle = y + sides[i][1] * (gap + height / 2);
+    for (int place = 0; place < 14; place++) {
+        const int i = place < 8 ? place : place - 6;
+        const double middle = y + sides[i][1] * (gap + (place < 8 ? height / 2 : 1.5 * height));
         const double start = sides[i][0] > 0   ? x + (sides[i][1] == 0 ? gap : 2)
                              : sides[i][0] < 0 ? x - width - (sides[i][1] == 0 ? gap : 2)
                                                : x - width / 2;

@@ -103,11 +103,12 @@ static gbt_status measure_run(loaded_run *r, const char *path, rate_model *out, 
             left_out++;
             continue;
         }
+        char name[32];
         rate_row *row = &out->rows[out->row_count];
         status = measure_row(r, &s, ladder[i], path, row, err);
         if (status == GBT_OK)
-            log_info("%s: %g dB: %zu bytes, PSNR %.3f dB (%.3f before)", out->name, row->quality,
-                     row->sizes.total, row->psnr, out->psnr);
+            log_info("%s: %s: %zu bytes, PSNR %.3f dB (%.3f before)", out->name,
+                     rate_row_name(row, name, sizeof name), row->sizes.total, row->psnr, out->psnr);
         out->row_count += status == GBT_OK;
     }
     if (left_out > 0)

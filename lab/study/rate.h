@@ -31,6 +31,9 @@ typedef struct rate_study {
     size_t model_count;
 } rate_study;
 
+/** A row's name in tables: "60 dB", "lossless". */
+const char *rate_row_name(const rate_row *row, char *out, size_t size);
+
 /** The files that the study writes. */
 extern const study_output rate_output;
 

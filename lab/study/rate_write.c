@@ -17,7 +17,7 @@ static double per_anchor(const rate_model *m, size_t bytes)
     return (double)bytes / (m->anchors > 0 ? (double)m->anchors : 1);
 }
 
-static const char *row_name(const rate_row *row, char *out, size_t size)
+const char *rate_row_name(const rate_row *row, char *out, size_t size)
 {
     snprintf(out, size, row->quality > 0 ? "%g dB" : "lossless", row->quality);
     return out;
@@ -45,7 +45,7 @@ static void add_tables(const void *of, text *out)
             const size_t parts[] = {s->positions, s->features, s->offsets, s->scales,
                                     s->pixels,    s->steps,    s->networks};
             size_t rest = s->total;
-            text_format(out, "| %s | %zu | %.2f | %.1f |", row_name(r, name, sizeof name), s->total,
+            text_format(out, "| %s | %zu | %.2f | %.1f |", rate_row_name(r, name, sizeof name), s->total,
                         per_anchor(m, s->total), (double)m->plain_bytes / (double)s->total);
             for (size_t p = 0; p < sizeof parts / sizeof *parts; p++) {
                 text_format(out, " %.2f |", per_anchor(m, parts[p]));

@@ -2,6 +2,7 @@
 /* report/facts.c -- the tables of a run's page. */
 #include "report/facts.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/file.h"
@@ -62,7 +63,6 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
     const double bytes = e->model_bytes > 0 ? (double)e->model_bytes : (double)NAN;
     text_add(out, "<div class=\"box card\"><h3>From points to a model</h3><table class=\"facts\"><tbody>\n");
     report_text_row(out, "Started from", metrics_text(metrics, "start"));
-    report_count_row(out, "Points", metrics_number(metrics, "points"));
     report_count_row(out, "Anchors at the start", metrics_number(metrics, "anchors_initial"));
     report_count_row(out, "Anchors at the end", (double)e->anchors);
     report_count_row(out, "Gaussians per view", e->gaussians_per_view);
@@ -78,7 +78,8 @@ static void add_counts(text *out, const evaluation *e, const json_t *metrics)
     report_close_row(out);
     const double downscale = metrics_number(metrics, "downscale");
     if (downscale != 1)
-        report_number_row(out, "Photos made smaller by a factor of", downscale, 3, "");
+        report_number_row(out, "Photos made smaller by a factor of", downscale,
+                          downscale == floor(downscale) ? 0 : 3, "");
     report_text_row(out, "Held-out split", metrics_text(metrics, "eval_split"));
     report_count_row(out, "Held-out views", (double)e->view_count);
     if (metrics_text(metrics, "seed") != NULL) /* saved as text because it exceeds JSON's integers */

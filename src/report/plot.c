@@ -236,8 +236,8 @@ void plot_begin(text *out, const char *label, const char *css, const char *more,
 {
     text_format(out,
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"plot\" viewBox=\"0 0 %d %d\" width=\"%d\" "
-                "role=\"img\" aria-label=\"%s\"><style>",
-                width, height, width, label);
+                "height=\"%d\" role=\"img\" aria-label=\"%s\"><style>",
+                width, height, width, height, label);
     text_add(out, plot_css);
     text_add(out, css);
     text_add(out, more);

@@ -554,7 +554,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"
     mv moved made
-    "$program" study rate run -o rate >out 2>err && cmp -s out rate/rate.md && [ "$(grep -c '"row": ' rate/rate.json)" = 2 ] && grep -q '<svg xmlns' rate/rate.svg &&
+    "$program" study rate run -o rate >out 2>err && cmp -s out rate/rate.md && [ "$(grep -c '"row": ' rate/rate.json)" = 2 ] && grep -q '<svg xmlns.* height="[0-9]' rate/rate.svg && grep -q '^run: lossless: ' err &&
         [ "$(ls rate | wc -l)" = 3 ]
     report $? "study rate writes its tables and its chart" "$(cat err out)"
     "$program" export run plain.ply plain.spz plain.splat plain.glb --refine 5 --json plain.json >out 2>err && [ "$(grep -c 'dB to the model' out)" = 4 ] &&

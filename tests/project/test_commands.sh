@@ -23,6 +23,12 @@ gbtrace() {
     wait $viewer && grep 'http://' viewer
 }
 
+# ---- a script that a page runs by its name can be run
+grep -ohE '(^    |   |`)(bench|tests|tools|examples)/[a-z_/]+(\.py|\.sh)? ' "$source"/README.md "$source"/docs/*.md | tr -d '` ' | sort -u >scripts
+while IFS= read -r script; do [ -x "$source/$script" ] || echo "$script"; done <scripts >no_programs
+[ -s scripts ] && [ ! -s no_programs ]
+report $? "scripts that pages run by name are executable" "$(cat no_programs)"
+
 # ---- what stands in the folder before each command
 mkdir fresh && cd fresh || exit 1
 (

@@ -296,7 +296,7 @@ static void whole_page(void **state)
     assert_null(strstr(page, "class=\"none\""));
     assert_true(strstr(page, "<h2>Held-out views") < strstr(page, "<h2>Training"));
     assert_true(strstr(page, "<h2>Training") < strstr(page, "<h2>Where the time goes"));
-    assert_int_equal(occurrences(page, "made smaller by a factor of"), 1);
+    assert_int_equal(occurrences(page, "made smaller by a factor of</th><td>2</td>"), 1);
     free(page);
     json_object_set_new(metrics, "downscale", json_real(1)); /* nothing is made smaller: no row about it */
     page = write_report(&e, metrics);

@@ -147,6 +147,22 @@ static void one_point_is_a_chart(void **state)
     mem_free(svg);
 }
 
+/* A chart of speed: the mark at the left edge has neighbours on all sides. */
+static void crowded_marks_have_names(void **state)
+{
+    (void)state;
+    static const scatter_point points[] = {
+        {0, 0.602, 106.3, "exact"}, {0, 0.266, 54.1, "default"}, {0, 0.174, 40.7, "fast"},
+        {1, 0.52, 85.1, "1e-4"},    {1, 0.338, 65.6, "0.001"},   {1, 0.213, 46.3, "0.01"},
+        {1, 0.18, 40.7, "0.02"},    {1, 0.133, 33.3, "0.05"},    {2, 0.118, 41.3, "EWA splats"},
+        {2, 4.789, 54.1, "plain"},
+    };
+    enum { COUNT = sizeof points / sizeof *points };
+    char *svg = draw(points, COUNT, NULL, 0);
+    assert_int_equal(count_of(svg, "class=\"label"), COUNT);
+    mem_free(svg);
+}
+
 /* Where words start, and how wide their letters make them, at least. */
 static void words_cover_nothing(void **state)
 {
@@ -183,9 +199,13 @@ static void words_cover_nothing(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lists_of_kernels),    cmocka_unit_test(ways_in_turn),
-        cmocka_unit_test(chart_of_nothing),    cmocka_unit_test(one_point_is_a_chart),
-        cmocka_unit_test(words_cover_nothing), cmocka_unit_test(gradients_beyond_their_limits),
+        cmocka_unit_test(lists_of_kernels),
+        cmocka_unit_test(ways_in_turn),
+        cmocka_unit_test(chart_of_nothing),
+        cmocka_unit_test(one_point_is_a_chart),
+        cmocka_unit_test(crowded_marks_have_names),
+        cmocka_unit_test(words_cover_nothing),
+        cmocka_unit_test(gradients_beyond_their_limits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

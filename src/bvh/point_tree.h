@@ -41,15 +41,17 @@ struct point_tree {
     double lower[3], upper[3], reach; /* of the centres; the largest |coordinate| of any ball */
 };
 
-/** Squared distances to the eight boxes of a node. */
+/** Squared distances to the eight boxes of a node, from the nearest point of each. (A comparison with 0 would
+    be a branch without AVX-512, and the loop no vectors.) */
 static inline __attribute__((always_inline)) void boxes_distance(const point_node *node, const double q[3],
                                                                  double out[POINT_WIDTH])
 {
     for (int i = 0; i < POINT_WIDTH; i++) {
         double sum = 0;
         for (int j = 0; j < 3; j++) {
-            const double below = node->lower[j][i] - q[j], above = q[j] - node->upper[j][i];
-            const double most = below > above ? below : above, d = most > 0 ? most : 0;
+            const double lower = node->lower[j][i], upper = node->upper[j][i];
+            const double raised = q[j] > lower ? q[j] : lower, held = raised < upper ? raised : upper;
+            const double d = held - q[j];
             sum += d * d;
         }
         out[i] = sum;

@@ -78,7 +78,8 @@ static gbt_status check_row(const unsigned char *bytes, size_t byte_count, const
     container_row row;
     memcpy(&row, bytes + place, sizeof row);
     if (row.name[0] == '\0' || row.name[CONTAINER_NAME_SIZE - 1] != '\0')
-        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %zu has no proper name", path, place, i);
+        return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %zu: its name is empty or too long", path,
+                         place, i);
     s->dtype = (container_dtype)row.dtype;
     if (row.dtype > CONTAINER_U8 || container_dtype_size(s->dtype) == 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: section %s: unknown type %u", path, place, row.name,
@@ -117,7 +118,8 @@ gbt_status container_parse(const unsigned char *bytes, size_t byte_count, const 
 {
     *out = (container){0};
     if ((uintptr_t)bytes % 8 != 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: the bytes are not aligned", path);
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "%s: the bytes in memory are not aligned (wanted an address that 8 divides)", path);
     container_header h;
     GBT_TRY(check_header(bytes, byte_count, path, &h, err));
     const size_t table_bytes = h.section_count * sizeof(container_row);

@@ -78,7 +78,7 @@ static gbt_status read_parts(const model_parts *parts, const char *path, const u
         status = model_parts_code(parts, (code_part)part, c, err);
         if (status == GBT_ERR_FORMAT || (status == GBT_OK && !coder_read_whole(c)))
             status = base_fail(err, GBT_ERR_FORMAT,
-                               "%s: section coded.bytes: the part \"%s\" is not what its model codes to",
+                               "%s: section coded.bytes: the part \"%s\" cannot be decoded: it is damaged",
                                path, names[part]);
     }
     mem_free(c);

@@ -151,8 +151,8 @@ static gbt_status check_bytes(const char *path, const unsigned char *bytes, size
     GBT_TRY(container_parse(bytes, byte_count, path, &c, err));
     gbt_status status = model_from_container(&c, &back, err);
     if (status == GBT_OK && !same_parts(wanted, &back))
-        status =
-            base_fail(err, GBT_ERR_INTERNAL, "%s: the coded model does not come back as it was meant", path);
+        status = base_fail(err, GBT_ERR_INTERNAL,
+                           "%s: compressed, the model decodes to other values (a defect of gbtrace)", path);
     model_free(&back);
     container_free(&c);
     return status;

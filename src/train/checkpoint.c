@@ -301,7 +301,7 @@ static gbt_status read_state(trainer *t, const container *c, const char *path, g
                          t->scene.missing_names);
     GBT_TRY(check_data(t, c, path, err));
     if (counters[4] > PACE_SEGMENTS)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: pace of %llu parts (limit %d)", path,
+        return base_fail(err, GBT_ERR_FORMAT, "%s: the pace has %llu parts (wanted at most %d)", path,
                          (unsigned long long)counters[4], PACE_SEGMENTS);
     size_t position[2] = {CONTAINER_ANY, 3};
     const void *data;

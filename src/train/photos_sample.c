@@ -11,7 +11,8 @@ gbt_status photos_get_sample(photos *p, size_t view, const photo_sample *sample,
     const photo_pick *pick = &sample->pick;
     *camera = full;
     if (pick->step > 1 && !gbt_camera_every(&full, pick->step, pick->first[0], pick->first[1], camera))
-        return base_fail(err, GBT_ERR_ARGUMENT, "photo %zu has no %d pixels each way", view, pick->step);
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %d x %d pixels (wanted at least %d each way)",
+                         p->source->views[view].name, full.width, full.height, pick->step);
     GBT_TRY(photos_read_full(p, view, err));
     GBT_TRY(image_fit(out, camera->width, camera->height, 3, err));
     const float behind = p->source->views[view].alpha == GBT_ALPHA_WHITE;

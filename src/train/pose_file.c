@@ -75,7 +75,7 @@ static gbt_status take_poses(const json_t *root, const char *path, scene *s, gbt
     const json_t *photos = json_object_get(root, "photos"), *photo;
     size_t i, place = 0;
     if (!json_is_array(photos))
-        return base_fail(err, GBT_ERR_FORMAT, "%s: poses of no photos (wanted an array \"photos\")", path);
+        return base_fail(err, GBT_ERR_FORMAT, "%s: holds no poses (wanted an array \"photos\")", path);
     json_array_foreach(photos, i, photo)
     {
         double rotation[9], center[3];

@@ -345,7 +345,8 @@ static gbt_status read_views(seeding *s, photos *source, const size_t *views, si
         while (v->camera.width > SEED_LONG_SIDE || v->camera.height > SEED_LONG_SIDE)
             v->camera = photos_camera(source, view, ++level);
         if (!camera_lens_prepare(&v->camera, &v->lens))
-            return base_fail(err, GBT_ERR_ARGUMENT, "photo %zu: unusable camera parameters", view);
+            return base_fail(err, GBT_ERR_ARGUMENT, "%s: unusable camera parameters",
+                             source->source->views[view].name);
         const unsigned char *valid;
         GBT_TRY(photos_get(source, view, level, &v->photo, &valid, err));
         const size_t pixels = (size_t)v->photo.width * (size_t)v->photo.height;

@@ -252,7 +252,7 @@ static gbt_status write_about(const recipe *r, const gbt_make_scene_def *def, co
         "makes it again, bit for bit on the same kind of machine:\n\n"
         "    gbtrace make-scene %s -o DIR --width %d --height %d --views %d --points %d "
         "--point-noise %.9g --samples %d --seed %" PRIu64 "%s%s%s\n\n"
-        "- `images/`: %d photos of %d x %d pixels, display-referred colours.\n"
+        "- `images/`: %d photos of %d x %d pixels, 8 bits per channel.\n"
         "- `%s`: cameras (%s, exact poses) and at most %d points%s. "
         "A point lies on a surface that at least\n"
         "  three views see, with noise of %.9g of its distance per axis; observations have 0.3 "
@@ -336,7 +336,9 @@ static gbt_status check_other_cameras(const gbt_make_scene_def *def, const char 
     return def->lens != GBT_MAKE_SCENE_ROLLING || !file_exists(path)
                ? GBT_OK
                : base_fail(err, GBT_ERR_ARGUMENT,
-                           "%s: is there, with cameras that stand still (wanted another folder)", path);
+                           "%s: exists, and a COLMAP model cannot describe a rolling shutter (wanted another "
+                           "folder)",
+                           path);
 }
 
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err)

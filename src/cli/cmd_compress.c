@@ -30,7 +30,7 @@ static const option *options(int *count)
          .value = &def.lossless,
          .help = "store the model without loss"},
         DATA_OPTION(&def.data, "use the cameras of this data set instead of the one it was trained on"),
-        JSON_OPTION(&def.json, "write the figures to this file"),
+        JSON_OPTION(&def.json, "write the sizes and times to this file"),
         MEMORY_OPTION,
     };
     *count = sizeof rows / sizeof *rows;

@@ -16,6 +16,7 @@
 #include "base/stop_signal.h"
 #include "cluster/cluster.h"
 #include "data/json_out.h"
+#include "io/model_file.h"
 #include "run/run_sensitivity.h"
 #include "io/model_code.h"
 #include "train/config.h"
@@ -25,12 +26,12 @@ gbt_compress_def gbt_compress_def_default(void)
     return (gbt_compress_def){.quality = 60, .cookie_ = DEF_COOKIE};
 }
 
-/* The figures of the report. */
+/* Sizes and times, for the report. */
 typedef struct compression {
     size_t anchors, before;
     model_sizes after;
     double probe_seconds, encode_seconds, decode_seconds;
-    const char *steps_from;
+    const char *steps_from; /* what the quantization steps were computed from */
     bool lossless;
     bool kept; /* the file was already small: it was copied */
 } compression;
@@ -71,7 +72,8 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
         return GBT_OK;
     *has_views = def->data != NULL || r->data.place[0] != '\0';
     if (!*has_views) {
-        log_info("%s is not there: the steps come from the model alone (name the folder where it is now)",
+        log_info("%s is not there: quantization steps are estimated from the model alone, which makes the "
+                 "file larger (name the folder where the data set is now)",
                  r->model.data_folder);
         return GBT_OK;
     }
@@ -131,8 +133,8 @@ static gbt_status code_run(loaded_run *r, bool has_views, const gbt_compress_def
 /**
  * If `path` is a coded model that would not get smaller, make `out` a copy of it.
  *
- * A coarse file does not record its quality, which is the default unless the user chose another. So it is
- * coded again only if the wanted quality is below the default.
+ * A quantized file does not record its quality, which is the default unless the user chose another. So it is
+ * quantized again only if the wanted quality is below the default.
  */
 static gbt_status keep_small(const char *path, const gbt_compress_def *def, const char *out, compression *c,
                              gbt_error *err)
@@ -186,15 +188,16 @@ static void print_report(const compression *c, const char *out, FILE *report)
     part_row rows[PARTS];
     const double count = c->anchors > 0 ? (double)c->anchors : 1;
     list_parts(&c->after, rows);
-    fprintf(report,
-            "%s: %zu anchors, %zu bytes before, %zu after: %.1f times smaller, %.2f bytes per anchor (steps: "
-            "%s)\n",
-            out, c->anchors, c->before, c->after.total, (double)c->before / (double)c->after.total,
-            (double)c->after.total / count, c->steps_from);
+    fprintf(
+        report,
+        "%s: %zu anchors, %zu bytes before, %zu after: %.1f times smaller, %.2f bytes per anchor (%s%s)\n",
+        out, c->anchors, c->before, c->after.total, (double)c->before / (double)c->after.total,
+        (double)c->after.total / count, c->lossless ? "" : "quantization steps from ", c->steps_from);
     for (int i = 0; i < PARTS; i++)
         fprintf(report, "  %-10s%10zu bytes %8.2f per anchor\n", rows[i].name, rows[i].bytes,
                 (double)rows[i].bytes / count);
-    fprintf(report, "  steps found in %.2f s, encoded and checked in %.2f s, decoded in %.2f s\n",
+    fprintf(report,
+            "  quantization steps found in %.2f s, encoded and checked in %.2f s, decoded in %.2f s\n",
             c->probe_seconds, c->encode_seconds, c->decode_seconds);
 }
 

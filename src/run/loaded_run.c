@@ -17,6 +17,7 @@
 #include "data/gaussian_file.h"
 #include "data/gaussian_ply.h"
 #include "data/result_folder.h"
+#include "io/model_file.h"
 #include "train/near_distance.h"
 #include "train/pose_file.h"
 #include "train/rules.h"
@@ -177,7 +178,7 @@ static gbt_status place_views(double downscale, loaded_run *out, gbt_error *err)
         out->scene.points.position[i] += (float)(out->scene.origin[i % 3] - out->model.origin[i % 3]);
     if (downscale <= 0)
         downscale = out->def.downscale;
-    if (downscale <= 0) /* Gaussians of other programs */
+    if (downscale <= 0) /* not trained here: no setting says at which size */
         GBT_TRY(photos_result_downscale(&out->scene, out->picture_width, out->reduced, &downscale, err));
     return photos_open(&out->photos, &out->scene, downscale, err);
 }
@@ -190,7 +191,7 @@ static gbt_status take_refined_poses(loaded_run *r, gbt_error *err)
     r->poses_refined = file_exists(path);
     if (r->poses_refined)
         return pose_file_read(path, &r->scene, &r->held_out_aligned, err);
-    log_warn("%s is missing: photos have the poses of the data set, not those found in training", path);
+    log_warn("%s is missing: the data set's camera poses are used, not those refined in training", path);
     return GBT_OK;
 }
 
@@ -221,13 +222,14 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.1000s: plain Gaussians have no cameras (wanted `camera` or `data`)", run);
     if (data == NULL && !has_data && out->data.tried[0] == '\0')
-        return base_fail(err, GBT_ERR_IO, "%.1000s: the model names no data set; `data` must name it", run);
+        return base_fail(err, GBT_ERR_IO,
+                         "%.1000s: does not say on which data set it was trained; `data` must name it", run);
     if (data == NULL && !has_data)
         return base_fail(err, GBT_ERR_IO,
                          "%.300s: its data set is not found (tried %.1200s); `data` must name its new place",
                          run, out->data.tried);
     if (data == NULL && out->data.moved)
-        log_info("%s: its data set is taken from %s, for both were moved", run, out->data.place);
+        log_info("%s: its data set is read from %s, as both were moved together", run, out->data.place);
     GBT_TRY((out->data_is_known ? scene_load_known : scene_load)(data != NULL ? data : out->data.place,
                                                                  &split, &out->scene, err));
     if (!seen_points_match_cameras(&out->scene)) /* as training does */

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* trace/rays.c -- the rays through the pixel centres of a camera.
 
-   pixel --[lens]--> start and direction in camera axes --[aperture]--> --[pose of the row or column]--> world
+   pixel --[lens]--> start and direction in camera axes
+         --[aperture]--> the same point in focus, from another point of the aperture
+         --[pose of the row or column]--> start and direction in world axes
 
-   Cameras without an aperture take the first and last step a row at a time. */
+   Without an aperture whole rows go through the lens and the pose at once, which is faster. */
 #include "trace/rays.h"
 
 #include <math.h>
@@ -20,11 +22,12 @@
 
 enum { ROW_GRAIN = 8 };
 
-/* Directions of several lenses are kept as long as they are no more than about this many rays, 24 bytes each;
-   those of one lens are always kept. */
+/* Directions in camera axes are kept for the next picture by the same lens: of several lenses up to about
+   this many rays, 24 bytes each; of one lens always. */
 static const size_t kept_rays = (size_t)1 << 23;
 
-/* A cell of the aperture: a range of its area, from the middle out, and of a turn, as shares of 1. */
+/* A part of the aperture's disc in polar coordinates: a range of the area within a radius, as a fraction of
+   the disc's, and a range of the angle, as a fraction of a turn. */
 typedef struct aperture_cell {
     double area_low, area_span, turn_low, turn_span;
 } aperture_cell;
@@ -77,6 +80,7 @@ static void round3(const double from[3], float to[3])
     to[2] = (float)from[2];
 }
 
+/* From camera to world axes, for lenses whose directions are kept. */
 static void turn_row(const ray_job *job, const double *rotation, const double *lens_dir, float *dir)
 {
     for (int i = 0; i < job->shot->camera.width; i++, lens_dir += 3, dir += 3) {
@@ -241,16 +245,17 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
     if (!camera_lens_prepare(camera, lens))
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "camera: model %d has unusable parameters (wanted a known model, finite values, "
-                         "focal length > 0, a shape that the model has)",
+                         "focal length > 0, shape parameters that the model allows)",
                          (int)camera->model);
     if ((unsigned)camera->shutter > GBT_CAMERA_SHUTTER_COLUMNS)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: shutter %d (wanted 0 to %d)", (int)camera->shutter,
                          GBT_CAMERA_SHUTTER_COLUMNS);
     if (!pose_is_finite(camera))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: the pose is not finite");
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "camera: the rotation, centre or motion has a value that is not finite");
     if (!dmat_is_rotation(camera->rotation, 1e-3))
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "camera: the rotation is not one (wanted orthonormal within 1e-3, no reflection)");
+                         "camera: the matrix is no rotation (wanted orthonormal within 1e-3, no reflection)");
     if (!(shot->aperture_radius >= 0 && isfinite(shot->aperture_radius)))
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: aperture radius %g (wanted >= 0)",
                          shot->aperture_radius);
@@ -261,7 +266,8 @@ static gbt_status check_shot(const ray_shot *shot, camera_lens *lens, gbt_error 
     if (ray_shot_sample_count(shot) < 1)
         return base_fail(err, GBT_ERR_ARGUMENT, "camera: %d samples (wanted >= 1)", shot->samples);
     if (!(origin_bound(shot, lens) < RAY_ORIGIN_LIMIT))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: rays start farther out than %g", RAY_ORIGIN_LIMIT);
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: rays start more than %g from the origin",
+                         RAY_ORIGIN_LIMIT);
     return GBT_OK;
 }
 
@@ -380,8 +386,8 @@ static gbt_status make_rays(const ray_shot *shot, int sample, ray_image *out, gb
         job.shutter = shot->camera.shutter;
     GBT_TRY(check_shot(shot, &job.lens, err));
     if (sample < 0 || sample >= ray_shot_sample_count(shot))
-        return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d of %d", sample,
-                         ray_shot_sample_count(shot));
+        return base_fail(err, GBT_ERR_ARGUMENT, "camera: sample %d (wanted 0 to %d)", sample,
+                         ray_shot_sample_count(shot) - 1);
     job.cell = find_cell(sample, ray_shot_sample_count(shot));
     const bool flat = job.lens.kind == LENS_ORTHOGRAPHIC;
     const bool common_origin = !flat && (job.shutter == GBT_CAMERA_SHUTTER_GLOBAL || shot->one_start) &&

@@ -422,7 +422,7 @@ misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time 
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
-misuse 2 "made/sparse: is there, with cameras that stand still (wanted another folder)" make-scene tabletop -o made --lens rolling
+misuse 2 "made/sparse: exists, and a COLMAP model cannot describe a rolling shutter (wanted another folder)" make-scene tabletop -o made --lens rolling
 misuse 2 "--seeds: does not apply to study speed (only to paper time anchors)" study speed gaussians.ply -o study --seeds 3
 misuse 2 "--count: does not apply to query within (only to nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
 misuse 2 "--skip-test: cannot be combined with --skip-train" render tiny -o o --skip-train --skip-test
@@ -515,7 +515,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     mv made.hidden made
     "$program" compress run-small -o run-small/model.gbt >out 2>err && grep -q '; nothing to do$' out && cmp -s small.gbt run-small/model.gbt
     report $? "compress of a small model onto itself does nothing" "$(cat err out)"
-    "$program" compress run-small -o smaller.gbt --quality 40 >out 2>err && grep -q ' times smaller, .* (steps: training views)$' out && ! cmp -s smaller.gbt small.gbt
+    "$program" compress run-small -o smaller.gbt --quality 40 >out 2>err && grep -q ' times smaller, .* (quantization steps from training views)$' out && ! cmp -s smaller.gbt small.gbt
     report $? "compress codes a small model again at a lower quality" "$(cat err out)"
     "$program" compress run -o whole.gbt --lossless >out 2>err && "$program" compress whole.gbt -o copy.gbt --lossless >out 2>err && cmp -s whole.gbt copy.gbt &&
         grep -q 'already small' out && "$program" compress whole.gbt -o quantised.gbt >out 2>err && [ "$(wc -c <quantised.gbt)" -lt "$(wc -c <whole.gbt)" ]
@@ -537,7 +537,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     report $? "eval from another folder" "$(cat err out)"
     mkdir pair && cp -r made run-small pair && sed '2s#/made$#/gone#' run-small/data_places >pair/run-small/data_places &&
         (cd elsewhere && "$program" eval ../pair/run-small) >out 2>err &&
-        grep -q '^\.\./pair/run-small: its data set is taken from \.\./pair/run-small/\.\./made, ' err
+        grep -q '^\.\./pair/run-small: its data set is read from \.\./pair/run-small/\.\./made, ' err
     report $? "eval of a run that was moved with its data" "$(cat err out)"
     rm pair/run-small/data_places && "$program" eval pair/run-small >out 2>err
     report $? "eval of an older run, in the folder where it was trained" "$(cat err out)"
@@ -550,7 +550,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     got=$?
     [ "$got" = 4 ] && grep -q '(tried /gone/made, \.\./pair/run-small/\.\./gone, made)' err
     report $? "eval names all places of a missing data set" "  got $got: $(cat err out)"
-    mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(steps: the model alone)$' out && grep -q '^made is not there: ' err &&
+    mv made moved && "$program" compress run -o alone.gbt >out 2>err && grep -q '(quantization steps from the model alone)$' out && grep -q '^made is not there: ' err &&
         "$program" info alone.gbt >>out 2>>err
     report $? "a model without its data set becomes small too" "$(cat err out)"
     mv moved made

@@ -48,18 +48,16 @@ gbt_status bench_reference_make(const gaussians *g, const trace_settings *settin
 gbt_status bench_reference_leave_band(const gaussians *g, const trace_settings *settings,
                                       bench_reference *reference, gbt_error *err)
 {
-    const ray_image *rays = &reference->rays;
+    const size_t count = ray_image_count(&reference->rays);
     reference_scene exact = {0};
-    band_scratch scratch = {0};
     mem_free(reference->left_out);
-    reference->left_out =
-        mem_calloc(ray_image_count(rays), sizeof *reference->left_out, "rounding band", err);
-    gbt_status status =
-        reference->left_out == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(g, &exact, err);
-    for (size_t i = 0; i < ray_image_count(rays) && status == GBT_OK; i++)
-        status = rounding_band_find(&exact, settings, ray_image_origin(rays, i), rays->dir + 3 * i, &scratch,
-                                    &reference->left_out[i]);
-    band_scratch_free(&scratch);
+    reference->left_out = mem_alloc(count, sizeof *reference->left_out, "rounding band", err);
+    if (reference->left_out == NULL)
+        return GBT_ERR_NO_MEMORY;
+    memset(reference->left_out, true, count);
+    gbt_status status = reference_scene_make(g, &exact, err);
+    if (status == GBT_OK)
+        status = rounding_band_find(&exact, settings, &reference->rays, reference->left_out, err);
     reference_scene_free(&exact);
     return status;
 }

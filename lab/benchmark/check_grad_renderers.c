@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* benchmark/check_grad_renderers.c -- compare the adjoints of the renderers with double-precision versions.
  */
+#include <math.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "benchmark/check_grad.h"
 #include "reference/raster_ref.h"
 #include "trace/rounding_band.h"
-
-enum { RAY_GRAIN = 16 };
 
 /* Errors that float32 explains. Trained scenes have Gaussians whose thickness is 1e-5 of their distance,
    where the rounding of coordinates alone is 1e-2 of a standard deviation; the limit is five times that of
@@ -20,38 +19,11 @@ static const double colour_limit = 1e-5; /* between float and double splats that
    are drawn wrong. */
 static const double left_out_limit = 0.9, left_out_limit_of_splats = 0.01;
 
-typedef struct band_job {
-    const grad_checker *c;
-    bool *in_band;      /* [rays] */
-    gbt_status *status; /* per block */
-} band_job;
-
-static void band_block(size_t block, size_t begin, size_t end, void *context)
-{
-    const band_job *job = context;
-    const ray_image *rays = &job->c->frame->rays;
-    band_scratch scratch = {0};
-    for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++)
-        job->status[block] =
-            rounding_band_find(&job->c->scene, &job->c->run->settings, ray_image_origin(rays, i),
-                               rays->dir + 3 * i, &scratch, &job->in_band[i]);
-    band_scratch_free(&scratch);
-}
-
 /* Find the rays on which rounding may change which Gaussians are blended, or in which order. */
 static gbt_status find_band(grad_checker *c, bool *in_band, gbt_error *err)
 {
-    const size_t blocks = parallel_block_count(c->ray_count, RAY_GRAIN);
-    band_job job = {
-        .c = c, .in_band = in_band, .status = mem_calloc(blocks, sizeof *job.status, "check band", err)};
-    gbt_status status = job.status == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
-    if (status == GBT_OK)
-        parallel_blocks(c->ray_count, RAY_GRAIN, band_block, &job);
-    for (size_t block = 0; status == GBT_OK && block < blocks; block++)
-        if (job.status[block] != GBT_OK)
-            status = base_fail(err, job.status[block], "check-grad: no memory for the hits of a ray");
-    mem_free(job.status);
-    return status;
+    memset(in_band, true, c->ray_count);
+    return rounding_band_find(&c->scene, &c->run->settings, &c->frame->rays, in_band, err);
 }
 
 /* The same for splats. Their double-precision version does not report hits, so take the pixels whose colours

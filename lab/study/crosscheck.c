@@ -86,23 +86,24 @@ static gbt_status compare_outside_band(const bench_scene *s, const trace_setting
     size_t left_out = 0;
     double sum = 0;
     reference_scene exact = {0};
-    band_scratch scratch = {0};
-    gbt_status status = reference_scene_make(s->gaussians, &exact, err);
+    bool *in_band = mem_alloc(pixels, sizeof *in_band, "rounding band", err);
+    gbt_status status = in_band == NULL ? GBT_ERR_NO_MEMORY : reference_scene_make(s->gaussians, &exact, err);
     for (size_t i = 0; i < pixels && status == GBT_OK; i++) {
-        double square = 0, max = 0;
-        for (size_t k = 3 * i; k < 3 * i + 3; k++) {
-            const double off = fabs((double)traced->pixels[k] - (double)splatted->pixels[k]);
-            square += off * off;
-            max = larger_or_nan(max, off);
-        }
-        bool in_band = false;
-        if (!(max <= 1e-5))
-            status = rounding_band_find(&exact, settings, ray_image_origin(&s->rays, i), s->rays.dir + 3 * i,
-                                        &scratch, &in_band);
-        left_out += in_band;
-        sum += in_band ? 0 : square;
+        double max = 0;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++)
+            max = larger_or_nan(max, fabs((double)traced->pixels[k] - (double)splatted->pixels[k]));
+        in_band[i] = !(max <= 1e-5);
     }
-    band_scratch_free(&scratch);
+    if (status == GBT_OK)
+        status = rounding_band_find(&exact, settings, &s->rays, in_band, err);
+    for (size_t i = 0; i < pixels && status == GBT_OK; i++) {
+        left_out += in_band[i];
+        for (size_t k = 3 * i; k < 3 * i + 3 && !in_band[i]; k++) {
+            const double off = (double)traced->pixels[k] - (double)splatted->pixels[k];
+            sum += off * off;
+        }
+    }
+    mem_free(in_band);
     reference_scene_free(&exact);
     *psnr = bench_error_of(sum, 0, 3 * (pixels - left_out)).psnr;
     *kept = (double)(pixels - left_out) / (double)pixels;

@@ -3,6 +3,7 @@
    references, and time the tracer on a larger cloud. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "base/clock.h"
 #include "base/fail.h"
@@ -87,16 +88,13 @@ static gbt_status set_up(self_test *p, size_t count, double size, int width, int
 
 static gbt_status find_band(self_test *p, const reference_scene *exact, size_t *left_out, gbt_error *err)
 {
-    band_scratch scratch = {0};
-    gbt_status status = GBT_OK;
+    const size_t rays = ray_image_count(&p->rays);
     *left_out = 0;
-    for (size_t i = 0; i < ray_image_count(&p->rays) && status == GBT_OK; i++) {
-        status = rounding_band_find(exact, &p->settings, ray_image_origin(&p->rays, i), p->rays.dir + 3 * i,
-                                    &scratch, &p->in_band[i]);
+    memset(p->in_band, true, rays);
+    GBT_TRY(rounding_band_find(exact, &p->settings, &p->rays, p->in_band, err));
+    for (size_t i = 0; i < rays; i++)
         *left_out += p->in_band[i];
-    }
-    band_scratch_free(&scratch);
-    return status == GBT_OK ? GBT_OK : base_fail(err, status, "self test: no memory");
+    return GBT_OK;
 }
 
 void doctor_compare(gbt_diagnosis *d, const char *name, const char *what, double error, double limit,

@@ -114,6 +114,11 @@ static double near_of(const ray_image *rays, size_t i)
     return rays->near == NULL ? 0 : (double)rays->near[i];
 }
 
+static double T_front_of(const ray_image *rays, size_t i)
+{
+    return rays->near == NULL ? 1 : (double)rays->T_front[i];
+}
+
 /* The key of a Gaussian in the one order of a packet's rays (packet_order); 0 if one of them hits it at
    t_near. */
 static double packet_depth(const prepared *p, const trace_settings *s, const reference_ray *ray)
@@ -160,14 +165,14 @@ static gbt_status gather(const prepared *all, size_t all_count, const trace_sett
 }
 
 /* Front to back; returns how many hits were added. */
-static size_t blend(const reference_scene *scene, const trace_settings *s, const hit_list *list,
-                    const double dir[3], double T, double rgb[3], double *transmittance)
+static size_t blend(const reference_scene *scene, const trace_settings *s, const reference_hit *hits,
+                    size_t count, const double dir[3], double T, double rgb[3], double *transmittance)
 {
     double behind[3];
     size_t n = 0;
     rgb[0] = rgb[1] = rgb[2] = 0;
-    for (; n < list->count; n++) {
-        const reference_hit *hit = &list->hits[n];
+    for (; n < count; n++) {
+        const reference_hit *hit = &hits[n];
         const double T_next = T * (1 - hit->alpha);
         if (T_next < (double)s->transmittance_min)
             break;
@@ -201,7 +206,7 @@ static void make_reference_ray(const trace_settings *s, const ray_image *rays, s
     ray_of(rays, i, out->origin, out->dir);
     out->near = near_of(rays, i);
     out->far = far_of(rays, i);
-    out->T_front = rays->near == NULL ? 1 : (double)rays->T_front[i];
+    out->T_front = T_front_of(rays, i);
     out->own_order = !s->packet_order;
     out->rays = rays;
     out->packet_count = 0;
@@ -221,46 +226,43 @@ static void make_reference_ray(const trace_settings *s, const ray_image *rays, s
     }
 }
 
-typedef struct forward_job {
+typedef struct visit_job {
     const reference_scene *scene;
     const trace_settings *s;
     const ray_image *rays;
+    const bool *wanted;
     const prepared *all;
-    double *rgb, *transmittance;
-    uint32_t *blended;
+    reference_visitor *visit;
+    void *context;
     gbt_status *status; /* per block */
-} forward_job;
+} visit_job;
 
-static void forward_block(size_t block, size_t begin, size_t end, void *context)
+static void visit_block(size_t block, size_t begin, size_t end, void *context)
 {
-    const forward_job *job = context;
+    const visit_job *job = context;
     hit_list list = {0};
     for (size_t i = begin; i < end && job->status[block] == GBT_OK; i++) {
-        double transmittance;
         reference_ray ray;
+        if (job->wanted != NULL && !job->wanted[i])
+            continue;
         make_reference_ray(job->s, job->rays, i, &ray);
         job->status[block] = gather(job->all, job->scene->count, job->s, &ray, &list, NULL);
-        const size_t n =
-            blend(job->scene, job->s, &list, ray.dir, ray.T_front, job->rgb + 3 * i, &transmittance);
-        if (job->transmittance != NULL)
-            job->transmittance[i] = transmittance;
-        if (job->blended != NULL)
-            job->blended[i] = (uint32_t)n;
+        if (job->status[block] == GBT_OK)
+            job->visit(job->context, i, list.hits, list.count);
     }
     mem_free(list.hits);
 }
 
-gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s,
-                                   const ray_image *rays, double *rgb, double *transmittance,
-                                   uint32_t *blended, gbt_error *err)
+gbt_status reference_scene_visit(const reference_scene *scene, const trace_settings *s, const ray_image *rays,
+                                 const bool *wanted, reference_visitor *visit, void *context, gbt_error *err)
 {
     const size_t ray_count = ray_image_count(rays), block_count = parallel_block_count(ray_count, RAY_GRAIN);
     prepared *all = NULL;
     gbt_status *block_status = mem_calloc(block_count, sizeof *block_status, "reference", err);
     gbt_status status = block_status == NULL ? GBT_ERR_NO_MEMORY : prepare_all(scene, s, &all, err);
     if (status == GBT_OK) {
-        forward_job job = {scene, s, rays, all, rgb, transmittance, blended, block_status};
-        parallel_blocks(ray_count, RAY_GRAIN, forward_block, &job);
+        visit_job job = {scene, s, rays, wanted, all, visit, context, block_status};
+        parallel_blocks(ray_count, RAY_GRAIN, visit_block, &job);
         for (size_t block = 0; block < block_count && status == GBT_OK; block++)
             if (block_status[block] != GBT_OK)
                 status =
@@ -270,6 +272,35 @@ gbt_status reference_scene_forward(const reference_scene *scene, const trace_set
     mem_free(all);
     mem_free(block_status);
     return status;
+}
+
+typedef struct forward_job {
+    const reference_scene *scene;
+    const trace_settings *s;
+    const ray_image *rays;
+    double *rgb, *transmittance;
+    uint32_t *blended;
+} forward_job;
+
+static void blend_ray(void *context, size_t i, const reference_hit *hits, size_t count)
+{
+    const forward_job *job = context;
+    double origin[3], dir[3], transmittance;
+    ray_of(job->rays, i, origin, dir);
+    const size_t n = blend(job->scene, job->s, hits, count, dir, T_front_of(job->rays, i), job->rgb + 3 * i,
+                           &transmittance);
+    if (job->transmittance != NULL)
+        job->transmittance[i] = transmittance;
+    if (job->blended != NULL)
+        job->blended[i] = (uint32_t)n;
+}
+
+gbt_status reference_scene_forward(const reference_scene *scene, const trace_settings *s,
+                                   const ray_image *rays, double *rgb, double *transmittance,
+                                   uint32_t *blended, gbt_error *err)
+{
+    forward_job job = {scene, s, rays, rgb, transmittance, blended};
+    return reference_scene_visit(scene, s, rays, NULL, blend_ray, &job, err);
 }
 
 /* Chain from dL/dalpha of one hit to the fields of its Gaussian. */
@@ -314,7 +345,7 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
                          double d_transmittance, double *d_gaussians)
 {
     double rgb[3], T_left, behind[3], T_behind = 1;
-    const size_t blended = blend(scene, s, list, ray->dir, ray->T_front, rgb, &T_left);
+    const size_t blended = blend(scene, s, list->hits, list->count, ray->dir, ray->T_front, rgb, &T_left);
     sky_color_exact(&s->sky, s->background, ray->dir, behind);
     for (size_t i = blended; i-- > 0;) {
         const reference_hit *hit = &list->hits[i];

@@ -3,10 +3,6 @@
 #include "trace/rounding_band.h"
 
 #include <math.h>
-#include <string.h>
-
-#include "base/fail.h"
-#include "base/memory.h"
 
 static const double alpha_band = 1e-6, transmittance_band = 1e-5, depth_band = 2e-6;
 
@@ -37,25 +33,24 @@ static bool is_in_band(const reference_scene *scene, const trace_settings *s, co
     return false;
 }
 
-gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings,
-                              const float origin[3], const float dir[3], band_scratch *scratch, bool *in_band)
+typedef struct band_job {
+    const reference_scene *scene;
+    const trace_settings *settings;
+    bool *in_band;
+} band_job;
+
+static void look_at_ray(void *context, size_t ray, const reference_hit *hits, size_t count)
 {
-    trace_settings loose = *settings;
-    size_t count;
-    double from[3], along[3];
-    loose.alpha_min = fmaxf(loose.alpha_min - 2 * (float)alpha_band, 0);
-    for (int k = 0; k < 3; k++) {
-        from[k] = (double)origin[k];
-        along[k] = (double)dir[k];
-    }
-    GBT_TRY(reference_scene_ray_hits(scene, &loose, from, along, &scratch->hits, &count, &scratch->capacity,
-                                     NULL));
-    *in_band = is_in_band(scene, settings, scratch->hits, count);
-    return GBT_OK;
+    const band_job *job = context;
+    job->in_band[ray] = is_in_band(job->scene, job->settings, hits, count);
 }
 
-void band_scratch_free(band_scratch *scratch)
+gbt_status rounding_band_find(const reference_scene *scene, const trace_settings *settings,
+                              const ray_image *rays, bool *in_band, gbt_error *err)
 {
-    mem_free(scratch->hits);
-    memset(scratch, 0, sizeof *scratch);
+    trace_settings loose = *settings;
+    band_job job = {scene, settings, in_band};
+    loose.alpha_min = fmaxf(loose.alpha_min - 2 * (float)alpha_band, 0);
+    loose.packet_order = false; /* neighbours in depth are wanted */
+    return reference_scene_visit(scene, &loose, rays, in_band, look_at_ray, &job, err);
 }

@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "base/rng.h"
+#include "stability/draw.h"
 #include "trace/reference.h"
 
 void stability_crowd(stability *s, gaussians *g)

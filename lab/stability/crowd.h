@@ -4,7 +4,7 @@
 #ifndef GBT_STABILITY_CROWD_H
 #define GBT_STABILITY_CROWD_H
 
-#include "stability/draw.h"
+#include "stability/stability.h"
 
 /** The Gaussians of the scene file, followed by "more_gaussians" random ones in front of the origin (seed:
     "seed"). */

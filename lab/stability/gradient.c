@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "base/memory.h"
+#include "stability/draw.h"
 #include "trace/reference.h"
 
 typedef struct differences {

@@ -4,7 +4,9 @@
 #ifndef GBT_STABILITY_GRADIENT_H
 #define GBT_STABILITY_GRADIENT_H
 
-#include "stability/draw.h"
+#include "stability/stability.h"
+#include "trace/rays.h"
+#include "trace/settings.h"
 
 typedef struct gradient_error {
     double relative; /* L2 norm of the error / L2 norm of the differences; if those are all 0, L2 norm of the

@@ -4,6 +4,9 @@
 
 #include <stdio.h>
 
+#include "base/fail.h"
+#include "data/bytes.h"
+#include "data/gaussian_ply.h"
 #include "stability/draw.h"
 
 static void put_model(sink *out, const float (*rows)[MODEL_COLUMNS], size_t count)

@@ -4,7 +4,7 @@
 #ifndef GBT_STABILITY_MODEL_H
 #define GBT_STABILITY_MODEL_H
 
-#include "data/gaussian_ply.h"
+#include "data/gaussian_cloud.h"
 #include "stability/stability.h"
 
 enum { MODEL_COLUMNS = 14 }; /* x y z, f_dc 0 to 2, opacity (logit), scale (log) 0 to 2, rot 0 to 3 */

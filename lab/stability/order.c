@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "stability/crowd.h"
+#include "stability/draw.h"
 
 /* ---- A4: Gaussians in one place ---- */
 

@@ -9,9 +9,9 @@
 
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/rng.h"
 #include "data/colmap_write.h"
 #include "image/metrics.h"
+#include "stability/draw.h"
 
 static const double degree = 0.017453292519943295;
 

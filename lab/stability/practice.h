@@ -4,7 +4,7 @@
 #ifndef GBT_STABILITY_PRACTICE_H
 #define GBT_STABILITY_PRACTICE_H
 
-#include "stability/draw.h"
+#include "stability/stability.h"
 #include "train/trainer.h"
 
 enum { PRACTICE_VIEWS_MAX = 64, PRACTICE_POINTS_MAX = 4096, PRACTICE_PATH_SIZE = 1024 };

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/file.h"
+#include "data/json_fields.h"
 #include "stability/stability.h"
 
 bool stability_ok(stability *s, gbt_status status)

@@ -12,7 +12,9 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "base/vec.h"
+#include "data/bytes.h"
 #include "data/scene.h"
+#include "stability/draw.h"
 #include "stability/gradient.h"
 #include "stability/model.h"
 

@@ -11,11 +11,11 @@
 #ifndef GBT_STABILITY_STABILITY_H
 #define GBT_STABILITY_STABILITY_H
 
+#include <jansson.h>
 #include <stdbool.h>
 
 #include "base/gaussians.h"
 #include "base/image.h"
-#include "data/json_fields.h"
 
 struct text; /* report/text.h */
 

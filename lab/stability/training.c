@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/vec.h"
 #include "image/metrics.h"
+#include "stability/draw.h"
 #include "stability/practice.h"
 #include "train/held_out.h"
 

@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "base/rng.h"
 #include "stability/crowd.h"
+#include "stability/draw.h"
 
 static const double degree = 0.017453292519943295;
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/rng.h"
+#include "stability/draw.h"
 #include "stability/gradient.h"
 #include "stability/model.h"
 

@@ -3,6 +3,9 @@
 #include "study/anchors.h"
 
 #include "base/fail.h"
+#include "lab/lab.h"
+#include "study/grid.h"
+#include "study/runs.h"
 
 static gbt_status run_one(const void *study, size_t scene, size_t variant, int seed, const char *folder,
                           study_figures *out, gbt_error *err)

@@ -3,9 +3,7 @@
 #ifndef GBT_STUDY_ANCHORS_H
 #define GBT_STUDY_ANCHORS_H
 
-#include "lab/lab.h"
-#include "study/grid.h"
-#include "study/runs_stat.h"
+#include "study/output.h"
 
 enum {
     ANCHORS_VOXELS = 0, /* the two with which the others are compared */

@@ -1,10 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* study/anchors_write.c -- the study "anchors" as tables and as data. */
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 
 #include "data/json_out.h"
 #include "study/anchors.h"
+#include "study/grid.h"
+#include "study/runs.h"
+#include "study/runs_stat.h"
 
 enum { PAPER_BYTES_PER_ANCHOR = 316 }; /* 79 floats, by the paper's accounting */
 

@@ -3,7 +3,6 @@
 #ifndef GBT_STUDY_CHART_H
 #define GBT_STUDY_CHART_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "report/text.h"

@@ -7,7 +7,6 @@
 #include <stdio.h>
 
 #include "gbtrace/train.h"
-#include "report/text.h"
 
 enum {
     STUDY_SCENES_MAX = 16,

@@ -3,7 +3,6 @@
 #ifndef GBT_STUDY_TIME_H
 #define GBT_STUDY_TIME_H
 
-#include "lab/lab.h"
 #include "study/grid.h"
 #include "study/runs_stat.h"
 

@@ -9,6 +9,7 @@
 
 #include "anchor/decode_layout.h"
 #include "base/clones.h"
+#include "base/compare.h"
 
 enum { BATCH = 64 };
 

@@ -12,7 +12,6 @@
 #include "anchor/activations.h"
 #include "anchor/decode.h"
 #include "anchor/dense.h"
-#include "base/compare.h"
 
 enum {
     DECODE_CHUNK = 120,

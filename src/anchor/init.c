@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "bvh/points.h"
+#include "gb/adaptive.h"
 #include "gb/cloud.h"
 
 anchor_init_def anchor_init_def_default(void)

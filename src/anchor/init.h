@@ -4,10 +4,7 @@
 #ifndef GBT_ANCHOR_INIT_H
 #define GBT_ANCHOR_INIT_H
 
-#include <stdbool.h>
-
 #include "anchor/anchors.h"
-#include "gb/adaptive.h"
 #include "gb/balls.h"
 #include "gbtrace/choices.h"
 

@@ -20,6 +20,7 @@
 #include "base/plain_numbers.h"
 #include "data/gaussian_file.h"
 #include "data/json_out.h"
+#include "eval/lpips.h"
 #include "image/metrics.h"
 #include "run/loaded_run.h"
 #include "train/near_distance.h"
@@ -204,8 +205,7 @@ static gbt_status compare_view(exporting *e, size_t index, const gbt_camera *cam
         }
         f->to_baked += f->shown != f->baked ? share * metric_psnr(shown, baked) : 0;
         f->with_near += share * metric_psnr(shown, neural);
-        if (f->near != e->run.settings.t_near) { /* readers draw the file without the near distance if it
-                                                    cannot store it */
+        if (f->near != e->run.settings.t_near) { /* the file cannot store the model's near distance */
             const trace_settings own = viewer_at(e, index, f->near);
             GBT_TRY(frame_render(&e->frame, frame_plain(f->shown), camera, &own, false, err));
             image_quantize(shown);

@@ -4,7 +4,6 @@
 #ifndef GBT_BAKE_EXPORT_FOLDER_H
 #define GBT_BAKE_EXPORT_FOLDER_H
 
-#include "eval/lpips.h"
 #include "image/metrics.h"
 #include "run/loaded_run.h"
 

@@ -3,9 +3,6 @@
 #ifndef GBT_BASE_CHOICE_H
 #define GBT_BASE_CHOICE_H
 
-#include <stddef.h>
-
-#include "gbtrace/choices.h"
 #include "gbtrace/status.h"
 
 enum { CHOICE_TEXT_SIZE = 128 };

@@ -5,7 +5,6 @@
 #define GBT_BASE_CPU_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 /** From the narrowest to the widest. Every 64-bit ARM processor has NEON; AVX2 and AVX-512 exist on x86-64
     only. */

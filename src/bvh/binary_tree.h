@@ -8,7 +8,6 @@
 #define GBT_BVH_BINARY_TREE_H
 
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

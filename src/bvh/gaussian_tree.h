@@ -10,7 +10,6 @@
 #ifndef GBT_BVH_GAUSSIAN_TREE_H
 #define GBT_BVH_GAUSSIAN_TREE_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/gaussians.h"

@@ -8,7 +8,6 @@
 #include <stdint.h>
 
 #include "base/large_file.h"
-#include "data/gaussian_cloud.h"
 
 /** Floats of a row before the harmonics: number in the .ply (its bits), mean, scale_log, quaternion, opacity.
  */

@@ -4,7 +4,6 @@
 
 #include <stdio.h>
 
-#include "cli/command.h"
 #include "cli/progress.h"
 #include "gbtrace/compress.h"
 #include "gbtrace/evaluate.h"

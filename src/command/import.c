@@ -16,6 +16,7 @@
 #include "data/scene.h"
 #include "frame/frame.h"
 #include "gbtrace/train.h"
+#include "io/model_file.h"
 #include "io/scaffold_file.h"
 #include "train/config.h"
 #include "train/photos.h"

@@ -5,7 +5,6 @@
 #define GBT_DATA_RESULT_FOLDER_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "gbtrace/status.h"
 

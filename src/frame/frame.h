@@ -8,6 +8,7 @@
 #ifndef GBT_FRAME_FRAME_H
 #define GBT_FRAME_FRAME_H
 
+#include "anchor/decode.h"
 #include "base/stage.h"
 #include "frame/screen.h"
 #include "frame/subject.h"

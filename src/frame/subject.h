@@ -3,7 +3,7 @@
 #ifndef GBT_FRAME_SUBJECT_H
 #define GBT_FRAME_SUBJECT_H
 
-#include "anchor/decode.h"
+#include "anchor/anchors.h"
 #include "data/gaussian_cloud.h"
 
 /** Either anchors with their networks, or a cloud. Borrowed. Visibility is decided for its parts, which are

@@ -4,7 +4,7 @@
 #ifndef GBT_IO_SCAFFOLD_FILE_H
 #define GBT_IO_SCAFFOLD_FILE_H
 
-#include "io/model_file.h"
+#include "io/model.h"
 
 /**
  * Read anchors and networks (docs/formats.md) as a gbtrace model that decodes to the same Gaussians.

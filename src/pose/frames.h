@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 
-#include "base/image.h"
+#include "gbtrace/status.h"
 
 typedef struct frame_measure {
     double sharpness; /* frames_sharpness() */

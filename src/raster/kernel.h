@@ -7,7 +7,6 @@
 #define GBT_RASTER_KERNEL_H
 
 #include "base/cpu.h"
-#include "base/memory.h"
 #include "raster/raster.h"
 
 enum {

@@ -11,6 +11,7 @@
 
 #include "base/camera_pose.h"
 #include "base/fail.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "raster/gradients.h"

@@ -14,7 +14,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "base/cpu.h"
 #include "base/gaussians.h"
 #include "base/image.h"
 #include "base/sky.h"

@@ -9,6 +9,7 @@
 
 #include <stdlib.h>
 
+#include "base/memory.h"
 #include "base/vec.h"
 #include "raster/ewa16.h"
 

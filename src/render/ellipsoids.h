@@ -4,7 +4,6 @@
 #ifndef GBT_RENDER_ELLIPSOIDS_H
 #define GBT_RENDER_ELLIPSOIDS_H
 
-#include <stdbool.h>
 #include <stddef.h>
 
 #include "base/image.h"

@@ -3,8 +3,6 @@
 #ifndef GBT_REPORT_IMAGE_H
 #define GBT_REPORT_IMAGE_H
 
-#include <stdbool.h>
-
 #include "base/image.h"
 #include "report/text.h"
 

@@ -8,7 +8,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
 

@@ -7,7 +7,7 @@
 #include "cells/draw.h"
 #include "data/scene.h"
 #include "gbtrace/train.h"
-#include "io/model_file.h"
+#include "io/model.h"
 #include "train/config.h"
 #include "frame/frame.h"
 #include "train/photos.h"

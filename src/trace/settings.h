@@ -4,7 +4,6 @@
 #define GBT_TRACE_SETTINGS_H
 
 #include <stdbool.h>
-#include <string.h>
 
 #include "base/sky.h"
 #include "gbtrace/choices.h"

@@ -10,7 +10,6 @@
 #include <stdatomic.h>
 #include <stdbool.h>
 
-#include "base/cpu.h"
 #include "base/gaussians.h"
 #include "base/image.h"
 #include "bvh/gaussian_scene.h"

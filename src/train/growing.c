@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "anchor/init.h"
 #include "base/fail.h"
 #include "base/log.h"
 #include "base/memory.h"

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "gb/balls.h"
 #include "train/def.h"
 #include "train/schedule.h"
 

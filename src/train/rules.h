@@ -5,7 +5,6 @@
 #define GBT_TRAIN_RULES_H
 
 #include "frame/frame.h"
-#include "gb/balls.h"
 #include "gbtrace/train.h"
 #include "growth/statistics.h"
 #include "train/schedule.h"

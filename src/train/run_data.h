@@ -5,7 +5,6 @@
 #define GBT_TRAIN_RUN_DATA_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 #include "gbtrace/status.h"
 

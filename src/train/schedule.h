@@ -10,7 +10,6 @@
 #ifndef GBT_TRAIN_SCHEDULE_H
 #define GBT_TRAIN_SCHEDULE_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "gbtrace/status.h"

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "anchor/init.h"
 #include "base/compare.h"
 #include "base/fail.h"
 #include "base/log.h"

@@ -10,6 +10,7 @@
 #include "base/log.h"
 #include "base/memory.h"
 #include "data/photo_check.h"
+#include "gb/balls.h"
 #include "train/checkpoint.h"
 #include "train/exposure_spread.h"
 #include "train/memory_need.h"

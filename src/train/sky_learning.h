@@ -3,8 +3,6 @@
 #ifndef GBT_TRAIN_SKY_LEARNING_H
 #define GBT_TRAIN_SKY_LEARNING_H
 
-#include <stdint.h>
-
 #include "trace/settings.h"
 #include "train/adam.h"
 

@@ -4,11 +4,9 @@
 #define GBT_TRAIN_TRAINER_H
 
 #include "anchor/anchors.h"
-#include "anchor/init.h"
 #include "data/scene.h"
 #include "gbtrace/train.h"
 #include "frame/frame.h"
-#include "growth/growth.h"
 #include "train/exposure.h"
 #include "train/learnables.h"
 #include "train/photos.h"

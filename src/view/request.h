@@ -3,8 +3,9 @@
 #ifndef GBT_VIEW_REQUEST_H
 #define GBT_VIEW_REQUEST_H
 
-#include "frame/frame.h"
 #include "gbtrace/camera.h"
+#include "gbtrace/choices.h"
+#include "gbtrace/status.h"
 
 /** Limits for a picture, sides and pixels: a few seconds of work, tens of megabytes. SAMPLE_MAX: largest
     index of a sample. */

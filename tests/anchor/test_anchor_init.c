@@ -5,6 +5,7 @@
 
 #include "anchor/init.h"
 #include "base/parallel.h"
+#include "gb/adaptive.h"
 
 static anchor_init_def def_with_voxel(float voxel_size)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/raster/test_raster.c -- values known by hand, what is not drawn, sizes, threads, instruction sets,
    failures: both forms. */
+#include "base/cpu.h"
 #include "base/near.h"
 #include "base/parallel.h"
 #include "raster/raster_support.h"

@@ -15,6 +15,10 @@ python3 "$source/tests/project/check_links.py" "$work/site" >"$work/out" 2>&1
 report $? "links lead to pages, pictures and headings; each page is reached" "$(cat "$work/out")"
 [ "$(ls "$work"/site/*.html | wc -l)" = "$(ls "$source"/docs/*.md | wc -l | awk '{ print $1 + 3 }')" ]
 report $? "one for each document, README, CONTRIBUTING and CHANGELOG" "$(ls "$work/site")"
+awk '/^[-+*] / && before != "" && before !~ /^( |- |\|)/ && before !~ /[.:;)]$/ { print FILENAME ":" FNR ": " $0 } { before = $0 }' \
+    "$source"/*.md "$source"/docs/*.md "$source"/docs/decisions/*.md >"$work/out"
+[ ! -s "$work/out" ]
+report $? "no minus at the start of a line makes an item of a list out of a formula" "$(cat "$work/out")"
 
 # Wrong links, in a copy.
 mkdir "$work/tree" && cp -r "$source/docs" "$source/tools" "$source/README.md" "$source/CONTRIBUTING.md" "$source/CHANGELOG.md" "$work/tree/"

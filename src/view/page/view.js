@@ -190,7 +190,7 @@ function describe(about, done) {
         parts.push(look.pointed);
     if (byId("grid").checked)
         parts.push(`grid of ${roundBelow(look.subject.radius / 2)}`);
-    const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => t.toFixed(0));
+    const ms = [about.total_ms, about.prepare_ms, about.trace_ms, about.encode_ms + about.transfer_ms, about.draw_ms].map(t => Math.max(t, 0).toFixed(0));
     const more = document.createElement("span");
     more.className = "more"; // where there is room
     more.textContent = ` · ${ms[0]} ms (prepare ${ms[1]}, trace ${ms[2]}, send ${ms[3]}, draw ${ms[4]})`;

@@ -52,11 +52,10 @@ class View(NamedTuple):
 
 
 def _gaussians_struct(g):
-    count = len(g.mean)
-    functions = g.sh.shape[1] if getattr(g.sh, "ndim", 0) == 3 else 0
+    count, functions = (np.shape(a)[axis] if np.ndim(a) > axis else 0 for a, axis in ((g.mean, 0), (g.sh, 1)))
     degree = {1: 0, 4: 1, 9: 2, 16: 3}.get(functions)
     if degree is None:
-        raise ValueError(f"sh: shape {getattr(g.sh, 'shape', None)} (wanted (count, 1, 4, 9 or 16, 3))")
+        raise ValueError(f"sh: shape {np.shape(g.sh)} (wanted (count, 1, 4, 9 or 16, 3))")
     return lib.CGaussians(count, degree, lib.address(g.mean, "mean", (count, 3)), lib.address(g.scale_log, "scale_log", (count, 3)),
                           lib.address(g.quat, "quat", (count, 4)), lib.address(g.opacity, "opacity", (count,)),
                           lib.address(g.sh, "sh", (count, functions, 3)))
@@ -179,7 +178,9 @@ class Model:
         wants = gaussians is not None and gaussians is not False
         if wants:
             shapes = self._shapes()
-            if gaussians is True:
+            if gaussians is not True:
+                lib.wanted(gaussians, "gaussians", Gaussians, ", or True")
+            else:
                 gaussians = Gaussians(*(np.empty(shape, np.float32) for shape in shapes))
             struct = lib.CGaussiansGradient(*(None if a is None else lib.address(a, name, shape, True)
                                               for a, name, shape in zip(gaussians, Gaussians._fields, shapes)))

@@ -29,7 +29,7 @@ def train(data, run, **settings):
     It leaves a large model.gbt without scores. What the program does then: `gbtrace compress RUN -o RUN/model.gbt` makes it small, evaluate()
     makes scores, renders and the report.
     """
-    lines = "".join(_setting(key.replace("_", "-"), int(value) if isinstance(value, bool) else value) for key, value in settings.items())
+    lines = "".join(_setting(key.replace("_", "-"), int(value) if isinstance(value, (bool, np.bool_)) else value) for key, value in settings.items())
     lib.call("gbt_train_with", lib.optional(data), lib.encode(run), lines.encode())
     return Model(run)
 

@@ -351,6 +351,14 @@ class Plain(unittest.TestCase):
         np.testing.assert_array_equal(mean, gradient.mean)
         np.testing.assert_array_equal(again, pose)
 
+    def test_wrong_gradients(self):
+        model = gbtrace.Model.from_gaussians(*some_gaussians())
+        d_rgb = np.ones_like(model.render(a_camera(), keep=True))
+        with self.assertRaisesRegex(TypeError, r"gaussians: int \(wanted a gbtrace\.Gaussians, or True\)"):
+            model.gradient(d_rgb, gaussians=5)
+        with self.assertRaisesRegex(gbtrace.ArgumentError, "range of float"):
+            model.gradient(3e38 * d_rgb)
+
     def test_gaussians_can_be_had(self):
         g = some_gaussians()
         model, camera = gbtrace.Model.from_gaussians(*g), a_camera()
@@ -379,7 +387,8 @@ class Plain(unittest.TestCase):
         g = some_gaussians()
         for field, value, error, says in (("mean", g.mean[:7], ValueError, "scale_log: shape"), ("opacity", g.opacity + 2, gbtrace.ArgumentError, "opacity of Gaussian 0"),
                                           ("quat", g.quat * 0, gbtrace.ArgumentError, "quat of Gaussian 0"), ("sh", g.sh[:, :5], ValueError, "wanted .count, 1, 4, 9 or 16"),
-                                          ("mean", g.mean * np.float32(np.nan), gbtrace.ArgumentError, "mean of Gaussian 0"), ("sh", g.sh.tolist(), ValueError, "sh")):
+                                          ("mean", g.mean * np.float32(np.nan), gbtrace.ArgumentError, "mean of Gaussian 0"), ("sh", g.sh.tolist(), TypeError, "sh: list"),
+                                          ("mean", None, TypeError, "mean: NoneType"), ("opacity", 0.5, TypeError, "opacity: float")):
             with self.assertRaisesRegex(error, says):
                 gbtrace.Model.from_gaussians(*g._replace(**{field: value}))
 
@@ -427,7 +436,7 @@ class Runs(unittest.TestCase):
                 gbtrace.train("/nowhere", SCRATCH / "run", **settings)
 
     def test_train(self):
-        model = gbtrace.train(os.environ["GBT_DATA"], SCRATCH / "run", iterations=3, downscale=2, grow=False)
+        model = gbtrace.train(os.environ["GBT_DATA"], SCRATCH / "run", iterations=3, downscale=2, grow=np.False_)
         self.assertEqual(model.info.iterations, 3)
 
     def test_a_stopped_training_is_resumed(self):

@@ -268,7 +268,7 @@ typedef struct init_outputs {
     const char *ply;
     bool mesh;        /* the PLY holds triangles, not points */
     const char *json; /* NULL: none */
-    FILE *report;
+    FILE *report;     /* NULL: none */
 } init_outputs;
 
 /** Everything after the anchors have been made. */
@@ -302,7 +302,7 @@ static gbt_status report_anchors(const char *data, const scene *s, const anchors
     facts->depth = spread_of(rows.depth, 1, a->count, scratch);
     if (out->json != NULL)
         status = save_json(out->json, data, facts, err);
-    if (status == GBT_OK)
+    if (status == GBT_OK && out->report != NULL)
         print_facts(out->report, facts);
 done:
     mem_free(scratch);

@@ -55,6 +55,20 @@ static void give_to_largest(const float scale_log[3], unsigned raised, float gra
         }
 }
 
+/* Sums and products of finite values can overflow. */
+static gbt_status beyond_range(gbt_error *err)
+{
+    return base_fail(err, GBT_ERR_ARGUMENT, "gradient: beyond the range of float (wanted a smaller d_rgb)");
+}
+
+static bool all_finite(const float *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(values[i]))
+            return false;
+    return true;
+}
+
 /* Convert f->d_gaussians into the caller's arrays. */
 static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out, gbt_error *err)
 {
@@ -72,6 +86,9 @@ static gbt_status plain_gradient(gbt_model *m, const gbt_gaussians_gradient *out
             g->quat[4 * i + k] /= m->quat_length[i];
     for (size_t i = 0; i < n && m->raised != NULL; i++)
         give_to_largest(cloud->scale_log + 3 * i, m->raised[i], g->scale_log + 3 * i);
+    if (!all_finite(m->d_mean, 3 * n) || !all_finite(g->scale_log, 3 * n) || !all_finite(g->quat, 4 * n) ||
+        !all_finite(g->opacity, n) || !all_finite(g->sh, 3 * GAUSSIAN_SH_COUNT * n))
+        return beyond_range(err);
     copy_floats(m->d_mean, 3 * n, out->mean);
     copy_floats(g->scale_log, 3 * n, out->scale_log);
     copy_floats(g->quat, 4 * n, out->quat);
@@ -106,5 +123,8 @@ gbt_status gbt_model_gradient(gbt_model *m, const float *d_rgb, double d_pose[6]
     GBT_TRY(frame_backward_gaussians(f, &d_image, err));
     if (d_pose != NULL)
         GBT_TRY(frame_backward_pose(f, loaded_run_subject(&m->run), d_pose, err));
+    for (int k = 0; k < 6 && d_pose != NULL; k++)
+        if (!isfinite(d_pose[k]))
+            return beyond_range(err);
     return d_gaussians != NULL ? plain_gradient(m, d_gaussians, err) : GBT_OK;
 }

@@ -17,7 +17,8 @@ static gbt_status check(const gbt_query_def *def, gbt_error *err)
 {
     GBT_TRY(def_check(def->cookie_, "gbt_query_def_default", err));
     if ((unsigned)def->kind > GBT_QUERY_CROSSED)
-        return base_fail(err, GBT_ERR_ARGUMENT, "kind: %d", (int)def->kind);
+        return base_fail(err, GBT_ERR_ARGUMENT, "kind: %d (wanted 0 to %d)", (int)def->kind,
+                         (int)GBT_QUERY_CROSSED);
     if ((def->at == NULL) == (def->from == NULL))
         return base_fail(err, GBT_ERR_ARGUMENT, "at, from: %s given (wanted exactly one of them)",
                          def->at == NULL ? "neither is" : "both are");

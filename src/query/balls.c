@@ -80,6 +80,8 @@ gbt_status gbt_balls_crossed(const gbt_balls *b, const double *origin, const dou
 
 void gbt_answers_free(gbt_answers *answers)
 {
+    if (answers == NULL)
+        return;
     mem_free(answers->first);
     mem_free(answers->index);
     mem_free(answers->value);

@@ -29,10 +29,11 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err)
     if (d->eval_at_count < 0 || d->eval_at_count > GBT_TRAIN_MAX_EVALS)
         return base_fail(err, GBT_ERR_ARGUMENT, "eval_at_count: %d (wanted 0 to %d)", d->eval_at_count,
                          GBT_TRAIN_MAX_EVALS);
-    for (int i = 1; i < d->eval_at_count; i++)
-        if (!(d->eval_at_seconds[i] > d->eval_at_seconds[i - 1]))
-            return base_fail(err, GBT_ERR_ARGUMENT, "eval_at: %g s after %g s (wanted increasing times)",
-                             d->eval_at_seconds[i], d->eval_at_seconds[i - 1]);
+    const double *at = d->eval_at_seconds;
+    for (int i = 0; i < d->eval_at_count; i++)
+        if (!(at[i] >= 0 && (i == 0 || at[i] > at[i - 1])))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "eval_at_seconds: %g (wanted increasing times, from 0 on)", at[i]);
     if (d->resume && d->overwrite)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "overwrite: would delete the run that resume continues (wanted one of the two)");

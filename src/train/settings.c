@@ -225,6 +225,9 @@ gbt_status setting_check(const gbt_train_setting *s, const gbt_train_def *def, g
     char got[NUMBER_TEXT_SIZE], low[NUMBER_TEXT_SIZE], high[NUMBER_TEXT_SIZE];
     if (s->kind == GBT_SETTING_CHOICE)
         return choice_check(s->field, s->choices, (int)number, err);
+    if (s->kind == GBT_SETTING_TEXT && s->text != NULL &&
+        *(const char *const *)(const void *)((const char *)def + s->offset) == NULL)
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: NULL (wanted text)", s->field);
     if (s->kind == GBT_SETTING_TEXT || s->kind == GBT_SETTING_FLAG || any || (s->or_zero && number == 0) ||
         (number >= s->min && number <= s->max))
         return GBT_OK;

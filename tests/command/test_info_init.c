@@ -250,6 +250,7 @@ static void init_writes_world_coordinates(void **state)
     FILE *report = fopen("/dev/null", "w");
     gbt_init_def def = gbt_init_def_default();
     def.max_depth = 0;
+    assert_ok(gbt_init(data, &def, in_folder("out.ply"), NULL, NULL, NULL));
     assert_ok(gbt_init(data, &def, in_folder("out.ply"), NULL, report, NULL));
     fclose(report);
     json_t *back = info_as_json(in_folder("out.ply"));

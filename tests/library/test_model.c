@@ -412,7 +412,7 @@ static void what_is_not_rendered(void **state)
     for (int k = 0; k < 9; k++)
         twice_as_large.rotation[k] *= 2;
     gbt_error no_rgb = {0}, no_camera = {0}, no_rotation = {0}, not_kept = {0}, twice = {0}, nan = {0},
-              changed = {0};
+              large = {0}, changed = {0};
     assert_refused(gbt_model_render(model, &camera, 0, &(gbt_picture){0}, &no_rgb), &no_rgb, GBT_ERR_ARGUMENT,
                    "rgb is NULL");
     assert_refused(gbt_model_render(model, &bad, 1, &picture, &no_camera), &no_camera, GBT_ERR_ARGUMENT,
@@ -424,7 +424,18 @@ static void what_is_not_rendered(void **state)
     assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));
     d_rgb[4] = NAN;
     assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &nan), &nan, GBT_ERR_ARGUMENT, "value 4");
-    d_rgb[4] = 1;
+    for (int i = 0; i < 3 * W * H; i++)
+        d_rgb[i] = 3e38f;
+    float d_mean[3 * COUNT] = {7};
+    assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &large), &large, GBT_ERR_ARGUMENT, "range");
+    assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));
+    large = (gbt_error){0};
+    assert_refused(gbt_model_gradient(model, d_rgb, NULL, &(gbt_gaussians_gradient){.mean = d_mean}, &large),
+                   &large, GBT_ERR_ARGUMENT, "range");
+    assert_true(d_mean[0] == 7);
+    for (int i = 0; i < 3 * W * H; i++)
+        d_rgb[i] = i == 4;
+    assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));
     assert_ok(gbt_model_gradient(model, d_rgb, pose, NULL, NULL));
     assert_refused(gbt_model_gradient(model, d_rgb, pose, NULL, &twice), &twice, GBT_ERR_ARGUMENT, "keep");
     assert_ok(gbt_model_render(model, &camera, 1, &picture, NULL));

@@ -163,6 +163,7 @@ static void few_balls(void **state)
     gbt_answers_free(&a);
     gbt_answers_free(&a);
     gbt_balls_free(balls);
+    gbt_answers_free(NULL);
     gbt_balls_free(NULL);
 }
 
@@ -290,6 +291,10 @@ static void files_of_balls_and_queries(void **state)
     def = gbt_query_def_default();
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT,
                    "at, from: neither is given");
+    err = (gbt_error){0};
+    def.kind = (gbt_query_kind)9;
+    assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_ARGUMENT, "kind: 9 (wanted 0 to 4)");
+    def.kind = GBT_QUERY_NEAREST;
     err = (gbt_error){0};
     def.at = "1,2";
     assert_refused(gbt_query(balls, &def, stdout, &err), &err, GBT_ERR_FORMAT, "at:1: 2 numbers");

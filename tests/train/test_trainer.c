@@ -1539,8 +1539,9 @@ static void whole_numbers_are_whole(void **state)
 static void settings_out_of_range_are_named(void **state)
 {
     (void)state;
-    gbt_train_def bad[6];
-    for (int i = 0; i < 6; i++)
+    enum { BAD = 9 };
+    gbt_train_def bad[BAD];
+    for (int i = 0; i < BAD; i++)
         bad[i] = gbt_train_def_default();
     bad[0].init_count = 3;
     bad[1].init = (gbt_init_kind)9;
@@ -1548,13 +1549,22 @@ static void settings_out_of_range_are_named(void **state)
     bad[3].scale_factor = 0.001;
     bad[4].max_anchors = 0;
     bad[5].cookie_ = 0;
-    static const char *const says[6] = {"init_count: 3 (wanted 0 to 1)",
-                                        "init: 9 (wanted gb, adaptive, voxel or random)",
-                                        "renderer: 3 (wanted trace, raster or per-ray)",
-                                        "scale_factor: 0.001 (wanted 0.01 to 100, or 0)",
-                                        "max_anchors: 0 (wanted 1 to 1e+08)",
-                                        "the def was not made by gbt_train_def_default() of this version"};
-    for (int i = 0; i < 6; i++) {
+    bad[6].eval_at_seconds[0] = NAN;
+    bad[6].eval_at_count = 1;
+    bad[7].eval_at_seconds[0] = 5;
+    bad[7].eval_at_seconds[1] = 3;
+    bad[7].eval_at_count = 2;
+    bad[8].eval_split = NULL;
+    static const char *const says[BAD] = {"init_count: 3 (wanted 0 to 1)",
+                                          "init: 9 (wanted gb, adaptive, voxel or random)",
+                                          "renderer: 3 (wanted trace, raster or per-ray)",
+                                          "scale_factor: 0.001 (wanted 0.01 to 100, or 0)",
+                                          "max_anchors: 0 (wanted 1 to 1e+08)",
+                                          "the def was not made by gbt_train_def_default() of this version",
+                                          "eval_at_seconds: nan (wanted increasing times, from 0 on)",
+                                          "eval_at_seconds: 3 (wanted increasing times, from 0 on)",
+                                          "eval_split: NULL (wanted text)"};
+    for (int i = 0; i < BAD; i++) {
         gbt_error err = {0};
         trainer t = {0};
         assert_int_equal(trainer_open(&t, tiny, &bad[i], &err), GBT_ERR_ARGUMENT);

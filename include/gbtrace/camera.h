@@ -6,7 +6,8 @@
    centre of the top-left pixel is (0.5, 0.5). Lens formulas: docs/cameras.md.
 
    Threads: every function here is a pure function of its arguments and may be called from any thread.
-   `camera` is borrowed for the call. */
+   `camera` is borrowed for the call. Cameras are copied as they are; whether one can be used is checked where
+   it is used, by gbt_model_render(). */
 #ifndef GBTRACE_CAMERA_H
 #define GBTRACE_CAMERA_H
 
@@ -55,15 +56,17 @@ typedef enum gbt_camera_shutter {
 typedef struct gbt_camera {
     gbt_camera_model model;
     int width, height;                    /* pixels, > 0 */
-    double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order, then 0; lengths in pixels */
+    double params[GBT_CAMERA_MAX_PARAMS]; /* in the model's order, then 0; lengths in pixels, focal lengths
+                                             > 0 */
     double rotation[9];                   /* world to camera, row-major, orthonormal within 1e-3, det +1 */
-    double center[3];                     /* camera centre, world (scene-local) units */
+    double center[3];                     /* camera centre, in the coordinates of the data set or file */
     gbt_camera_shutter shutter; /* with a rolling shutter, the pose is that of the middle row or column */
     double motion[6]; /* rolling shutter: motion from the image's first edge to its last (downwards or to the
                          right), at constant velocity along a line; components as in gbt_camera_moved() */
 } gbt_camera;
 
-/** Number of lens models, and the model at `index` in their list, 0 to count - 1. */
+/** Number of lens models, GBT_CAMERA_ORTHOGRAPHIC included, and the model at `index` in their list, 0 to
+    count - 1. */
 int gbt_camera_model_count(void);
 gbt_camera_model gbt_camera_model_at(int index);
 
@@ -97,20 +100,20 @@ bool gbt_camera_unproject(const gbt_camera *camera, double px, double py, double
 bool gbt_camera_ray(const gbt_camera *camera, double px, double py, double origin[3], double dir[3]);
 
 /**
- * Image point of a world point: the inverse of gbt_camera_ray(). With a rolling shutter it is found by
- * iteration: each step projects with the pose at the image point found before. Where the camera moves so fast
- * that it sees a point twice, the result is one of the two image points, or none.
+ * Image point of a world point, pixels: the inverse of gbt_camera_ray(). With a rolling shutter it is found
+ * by iteration: each step projects with the pose at the image point found before. Where the camera moves so
+ * fast that it sees a point twice, the result is one of the two image points, or none.
  *
  * @return false where the camera does not see the point; `pixel` may lie outside the image
  */
 bool gbt_camera_pixel(const gbt_camera *camera, const double point[3], double pixel[2]);
 
-/** Image point of a point in camera axes; false where the model does not see it. gbt_camera_unproject()
-    inverts these formulas. */
+/** Image point, pixels, of a point in camera axes; false where the model does not see it. `pixel` may lie
+    outside the image. gbt_camera_unproject() inverts these formulas. */
 bool gbt_camera_project(const gbt_camera *camera, const double point_cam[3], double pixel[2]);
 
 /** The same camera for an image of another size: lengths in pixels are scaled per axis (single-f models need
-    equal ratios within 1 px). */
+    equal ratios within 1 px). Both sizes >= 1; for others, and for an unknown model, an unchanged copy. */
 gbt_camera gbt_camera_resized(const gbt_camera *camera, int width, int height);
 
 /**
@@ -130,8 +133,8 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
  */
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 
-/** The camera of a part of the image: `width` x `height` pixels, with pixel (x, y) of this image at the top
-    left. Returns false as gbt_camera_shifted() does. */
+/** The camera of a part of the image: `width` x `height` pixels, both >= 1, with pixel (x, y) of this image
+    at the top left; it may reach beyond the image. Returns false as gbt_camera_shifted() does. */
 bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out);
 
 /**

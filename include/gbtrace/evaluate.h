@@ -16,7 +16,7 @@ typedef struct gbt_evaluate_def {
     const char *data;      /* data set folder; NULL: the one the model was trained on. Default NULL */
     const char *json;      /* also write the scores here; NULL: nowhere else. Default NULL */
     gbt_renderer renderer; /* one that can train, or GBT_RENDERER_AS_TRAINED, the default */
-    double downscale;      /* photos are divided by this, >= 1; 0: as in training. Default 0 */
+    double downscale;      /* divisor of the photos' sizes, [1, 64]; 0: as in training. Default 0 */
     bool report;           /* also write RUN/report.html. Default true */
     gbt_preset preset;     /* default GBT_PRESET_AS_TRAINED */
     bool tensorboard;      /* also write RUN/events.out.tfevents.1.eval: scores, and up to eight renders with
@@ -107,7 +107,7 @@ typedef struct gbt_render_def {
     gbt_split split;           /* default GBT_SPLIT_TEST */
     gbt_renderer renderer;     /* default GBT_RENDERER_AS_TRAINED */
     gbt_picture_format format; /* default GBT_PICTURE_PNG */
-    double downscale;          /* 0: as in training. Default 0 */
+    double downscale;          /* divisor of the photos' sizes, [1, 64]; 0: as in training. Default 0 */
     const char *camera;        /* camera file (docs/cameras.md): render this camera instead of the views; the
                                   data set is not needed. Default NULL */
     const char *outputs; /* also write these, as float EXR (docs/formats.md): "depth,normal". They are traced,

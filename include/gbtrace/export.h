@@ -18,8 +18,9 @@ typedef struct gbt_export_def {
     int sh_degree;    /* degree of the spherical harmonics of the colours, 0 to 3. Default 3 */
     int refine_steps; /* optimisation steps that fit the plain Gaussians to the model's own renders, >= 0.
                          Default 500 */
-    int gaussians;    /* maximum number in a file made from a model, including the backdrop: those with the
-                               largest blending weight in the training views are kept; 0: all. Default 0 */
+    int gaussians; /* maximum number in a file made from a model, including the backdrop (with `backdrop` more
+                      than 1000): those with the largest blending weight in the training views are kept; 0:
+                      all. Default 0 */
     bool backdrop; /* add the model's background as a sphere of 1000 Gaussians around everything: files have
                       no background, and viewers draw on black. Not where photos are transparent in
                       places. Default true */

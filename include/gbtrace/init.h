@@ -42,7 +42,7 @@ gbt_init_def gbt_init_def_default(void);
  * @param data      [in]  data set folder or point cloud (.ply)
  * @param out_ply   [in]  written atomically
  * @param json_path [in]  file for the counts as JSON with "schema": 1; NULL: none
- * @param report    [in]  open stream for the counts as text
+ * @param report    [in]  open stream for the counts as text; NULL: none
  * @return GBT_OK, GBT_ERR_ARGUMENT (def out of range, output is an input), GBT_ERR_FORMAT (bad data, no
  *         points), GBT_ERR_IO, GBT_ERR_NO_MEMORY
  *

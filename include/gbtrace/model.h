@@ -23,7 +23,7 @@ GBT_API_BEGIN
  *
  * Threads: one call at a time per model; different models may be used from different threads at the same
  * time. Each call runs on all threads that gbt_set_threads() allows; its results have the same bits for any
- * number of them.
+ * number of them. Models may be closed in any order.
  */
 typedef struct gbt_model gbt_model;
 
@@ -36,20 +36,22 @@ typedef struct gbt_model gbt_model;
  *                   gbt_export_format_at(), or a result folder of 3DGS. The data set is not needed
  * @param out  [out] free with gbt_model_close(); NULL on failure
  * @param err  [out] optional
- * @return GBT_OK, GBT_ERR_ARGUMENT, GBT_ERR_IO, GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (the path is too long), GBT_ERR_IO (cannot be read, or holds no model),
+ *         GBT_ERR_FORMAT, GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_model_open(const char *path, gbt_model **out, gbt_error *err);
 
 /** Plain Gaussians in the caller's arrays, with the parameters of 3DGS. A colour is max(0, 0.5 + sum_k sh_k
     Y_k(d)), with d the unit direction from the camera to the mean. */
 typedef struct gbt_gaussians {
-    size_t count;           /* >= 1 */
+    size_t count;           /* 1 to 2^32 - 1 */
     int sh_degree;          /* 0 to 3 */
-    const float *mean;      /* [count][3] */
+    const float *mean;      /* [count][3], within +-1e17 */
     const float *scale_log; /* [count][3], natural log of the std-devs, [-30, 30] */
-    const float *quat;      /* [count][4], w x y z, of any length from 1e-18 */
+    const float *quat;      /* [count][4], w x y z, of any length from 1e-18 to 1e18; local to world */
     const float *opacity;   /* [count], [0, 1] */
-    const float *sh;        /* [count][(sh_degree + 1)^2][3], coefficients in the order of 3DGS files */
+    const float *sh;        /* [count][(sh_degree + 1)^2][3], within +-1e18: red, green and
+                               blue of each function, in the order of 3DGS files */
 } gbt_gaussians;
 
 /**
@@ -58,15 +60,16 @@ typedef struct gbt_gaussians {
  * The arrays are copied. Quaternions are normalised; a scale below 1e-4 of the largest scale of its Gaussian
  * is raised to that value.
  *
- * @param g   [in]  borrowed for the call; every value finite
- * @param out       [out] free with gbt_model_close(); NULL on failure
- * @param err       [out] optional
+ * @param g   [in]  borrowed for the call
+ * @param out [out] free with gbt_model_close(); NULL on failure
+ * @param err [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (names the first invalid value), GBT_ERR_NO_MEMORY
  */
 gbt_status gbt_model_from_gaussians(const gbt_gaussians *g, gbt_model **out, gbt_error *err);
 
 /**
- * Replace the Gaussians of a model of plain Gaussians, by any number of them; settings stay.
+ * Replace the Gaussians of a model of plain Gaussians, by any number of them; settings stay, a kept render is
+ * dropped.
  *
  * @return as gbt_model_from_gaussians(); on failure nothing changes
  */
@@ -105,12 +108,12 @@ gbt_model_info gbt_model_get_info(const gbt_model *model);
 
 /** Settings of all renders of a model. */
 typedef struct gbt_model_settings {
-    float background[3]; /* colour behind the scene. Default: the model's; for plain Gaussians black, or white
-                            if a result folder says so. A learned sky is added to it until this colour is
-                            changed */
+    float background[3]; /* colour behind the scene, finite. Default: the model's; for plain Gaussians black,
+                            or white if a result folder says so. A learned sky is added to it until this
+                            colour is changed */
     float footprint; /* variance of the pixel footprint (rays as wide as pixels, docs/antialiasing.md), px^2,
                         [0, 4]; 0: thin rays. Default: as trained; 0.1 for plain Gaussians */
-    float t_near;    /* nearest distance at which anything is rendered, scene units, >= 0. Default: as
+    float t_near;    /* nearest distance at which anything is rendered, scene units, [0, 1e17]. Default: as
                         trained; for plain Gaussians 0.01, or what the file says */
     float alpha_min; /* smaller responses are skipped, [1e-30, 1). Default 1/255 */
     float alpha_max; /* larger responses are clamped to this, [alpha_min, 1). Default 0.99 */
@@ -120,8 +123,8 @@ typedef struct gbt_model_settings {
 
 gbt_model_settings gbt_model_get_settings(const gbt_model *model);
 
-/** Set them for all later renders. Returns GBT_OK, or GBT_ERR_ARGUMENT for a value out of range; nothing
-    changes then. */
+/** Set them for all later renders; a kept render is dropped. Returns GBT_OK, or GBT_ERR_ARGUMENT for a value
+    out of range; nothing changes then. */
 gbt_status gbt_model_set_settings(gbt_model *model, const gbt_model_settings *settings, gbt_error *err);
 
 /** One view of the data set that a model was trained on. */
@@ -136,7 +139,7 @@ typedef struct gbt_model_view {
 
 /**
  * Read the cameras of the data set that a model was trained on, or of another data set in the same
- * coordinates.
+ * coordinates. Views that were open are closed, also on failure. Photos are not read.
  *
  * @param data  [in]  data set folder; NULL: the one that the model names, relative to the current directory;
  *                    for a result folder of 3DGS the one in its cfg_args, or its cameras.json
@@ -152,23 +155,27 @@ gbt_status gbt_model_get_view(const gbt_model *model, size_t index, gbt_model_vi
 
 /* ---- render ---- */
 
-/** Output of a render: the caller's arrays, row-major. NULL: not computed. */
+/** Output of a render: the caller's arrays, row-major. NULL: not computed; rgb is required. */
 typedef struct gbt_picture {
-    float *rgb;           /* [height][width][3], with the background; required */
-    float *depth;         /* [height][width], distance along the ray, averaged over the hits by their blending
-                             weights; 0 where nothing is hit */
+    float *rgb;           /* [height][width][3], with the background; may exceed 1 */
+    float *depth;         /* [height][width], distance along the ray, scene units, averaged over the hits by
+                             their blending weights; 0 where nothing is hit */
     float *transmittance; /* [height][width], the share of the background in the pixel, [0, 1] */
 } gbt_picture;
 
 /**
- * Render an image from a camera.
+ * Render an image from a camera: a ray through the centre of each pixel. A render that was kept before is
+ * dropped, also on failure.
  *
- * @param camera [in]  any lens model; pixels without a ray get the background
+ * @param camera [in]  any lens model, rays starting within 1e17 of the coordinates' origin; pixels without a
+ *                     ray get the background
  * @param keep   [in]  true: keep what gbt_model_gradient() needs, about a byte per blended hit
  * @param out    [out] arrays of camera->width x camera->height pixels
  * @param err    [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (an unusable camera), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL; after a failure
  *         the contents of the arrays are undefined
+ * Cost: each call selects and decodes what is in view and builds a tree over it, then traces the rays. So
+ * many rays in one image cost less than the same rays in many small ones.
  */
 gbt_status gbt_model_render(gbt_model *model, const gbt_camera *camera, bool keep, const gbt_picture *out,
                             gbt_error *err);
@@ -185,8 +192,9 @@ typedef struct gbt_gaussians_gradient {
 } gbt_gaussians_gradient;
 
 /**
- * Adjoint of the last gbt_model_render() with `keep`: from dL/d(rgb) to the pose of its camera and to plain
- * Gaussians. It can be called once for each such render.
+ * Adjoint of the last gbt_model_render(), which must have had `keep`: from dL/d(rgb) to the pose of its
+ * camera and to plain Gaussians. It can be called once for each such render, before any change of the
+ * settings or the Gaussians; a call with unusable arguments does not count.
  *
  * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along
  * its own axes (right, down, forward), omega turns it about them, radians. Let W be the rotation from world
@@ -200,16 +208,16 @@ typedef struct gbt_gaussians_gradient {
  * because moving the camera is the same as moving all Gaussians the opposite way, except for the colours:
  * dL/de is the gradient through the directions of the spherical harmonics, or through the direction and
  * distance inputs of the networks. Pixel footprints move with the camera and are included in these sums.
- * Cut-offs are not differentiated: the image jumps a little where a response crosses alpha_min or a ray
- * reaches its end. dL/domega leaves out the rotation of a background that depends on direction (a learned
- * sky).
+ * Jumps of the image are not differentiated: a little one where a response crosses alpha_min or a ray reaches
+ * its end, and one where two overlapping Gaussians change their order along a ray. dL/domega leaves out the
+ * rotation of a background that depends on direction (a learned sky).
  *
  * @param d_rgb       [in]  [height][width][3], finite
  * @param d_pose      [out] dL/d(v, omega); optional (NULL)
  * @param d_gaussians [out] optional (NULL); plain Gaussians only
  * @param err         [out] optional
- * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, d_gaussians for a model with networks),
- *         GBT_ERR_NO_MEMORY
+ * @return GBT_OK, GBT_ERR_ARGUMENT (no kept render, d_rgb not finite, d_gaussians for a model with networks,
+ *         a gradient beyond the range of float), GBT_ERR_NO_MEMORY
  * Cost: about that of the render.
  */
 gbt_status gbt_model_gradient(gbt_model *model, const float *d_rgb, double d_pose[6],

@@ -51,7 +51,7 @@ gbt_status gbt_balls_open(const char *path, gbt_balls **out, gbt_error *err);
  *
  * @param position [in]  [count][3], within +-1e100
  * @param radius   [in]  [count], 0 to 1e100; NULL: points
- * @param count    [in]  fewer than 2^32 - 1
+ * @param count    [in]  fewer than 2^32 - 1; with 0 every answer is empty
  * @param out      [out] free with gbt_balls_free(); NULL on failure
  * @param err      [out] optional
  * @return GBT_OK, GBT_ERR_ARGUMENT (names the first bad ball), GBT_ERR_NO_MEMORY, GBT_ERR_INTERNAL
@@ -66,7 +66,7 @@ void gbt_balls_free(gbt_balls *balls);
 typedef struct gbt_balls_view {
     size_t count;
     const double *position; /* [count][3] */
-    const double *radius;   /* [count]; NULL: points */
+    const double *radius;   /* [count]; NULL: points, whose radius is 0 */
     bool anchors;           /* true: the balls are the anchors of a run */
 } gbt_balls_view;
 
@@ -90,7 +90,8 @@ gbt_status gbt_balls_nearest(const gbt_balls *balls, const double *point, size_t
                              bool skip_same, uint32_t *index, double *distance, gbt_error *err);
 
 /** Answers to many queries: query i has index[first[i]] .. index[first[i + 1] - 1], in ascending order. Start
-    from {0}; free with gbt_answers_free(), also after a failure. */
+    from {0}; a call first frees what is in it. Free it with gbt_answers_free(), also after a failure; it does
+    not need the balls any more. */
 typedef struct gbt_answers {
     size_t count;    /* queries */
     size_t *first;   /* [count + 1] */
@@ -99,6 +100,7 @@ typedef struct gbt_answers {
                         is nearest to the centre */
 } gbt_answers;
 
+/** Free the arrays and leave {0}. NULL is fine. */
 void gbt_answers_free(gbt_answers *answers);
 
 /* The next four functions answer `count` queries, with points and origins within +-1e100. They return GBT_OK,

@@ -2,7 +2,11 @@
 /* gbtrace/status.h -- how every function of the library reports failure.
 
    A status is the kind of failure; an error adds one line of text. The library never exits the process; its
-   messages and progress go to the listener of gbtrace/progress.h. */
+   messages and progress go to the listener of gbtrace/progress.h.
+
+   In all headers a pointer, as an argument or in a struct, may be NULL only where its comment says so, and
+   `err` always. After a failure the contents of the caller's arrays are undefined, unless a comment says
+   otherwise. */
 #ifndef GBTRACE_STATUS_H
 #define GBTRACE_STATUS_H
 
@@ -21,10 +25,10 @@ typedef enum gbt_status {
 } gbt_status;
 
 /** The first failure wins: an error that already holds a text is not overwritten. Start from `gbt_error err =
-    {0};`, in C++ from `gbt_error err = {};`. */
+    {0};`, in C++ from `gbt_error err = {};`, and again from there when you go on after a failure. */
 typedef struct gbt_error {
-    gbt_status status;
-    char text[512]; /* one line, no newline: "FILE[:LINE|@OFFSET]: what was wrong (wanted, got)" */
+    gbt_status status; /* of the first failure; calls also return theirs */
+    char text[512];    /* one line, no newline: "FILE[:LINE|@OFFSET]: what was wrong (wanted, got)" */
 } gbt_error;
 
 /** The exit code that a program should end with for a status: 0, 2, 3, 4, 5; 1 for GBT_ERR_INTERNAL, 130 for

@@ -15,8 +15,8 @@ GBT_API_BEGIN
 enum { GBT_TRAIN_MAX_EVALS = 16 };
 
 /** Settings of a training run. gbt_train_setting_at() has the range, the default and a help text of each
-    field. 0 means that the program chooses the value only for the fields where 0 cannot be a value itself:
-    init_count, voxel_size, offsets, iterations, budget_seconds, downscale, scale_factor. */
+    field but the last four. 0 means that the program chooses the value only for the fields where 0 cannot be
+    a value itself: init_count, voxel_size, offsets, iterations, budget_seconds, downscale, scale_factor. */
 typedef struct gbt_train_def {
     gbt_init_kind init;
     double init_count; /* anchors per point of GBT_INIT_ADAPTIVE and _RANDOM; at least one anchor is made; 0:
@@ -92,7 +92,7 @@ typedef struct gbt_train_def {
                                                     training; the clock stops meanwhile. With `resume`, the
                                                     last time that has passed without a score is caught up
                                                     after the first step */
-    int eval_at_count;                           /* [0, GBT_TRAIN_MAX_EVALS]; times ascend */
+    int eval_at_count;                           /* [0, GBT_TRAIN_MAX_EVALS]; times ascend, from 0 on */
     const char *command;                         /* the command line, for the report. Default "" */
     uint32_t cookie_;                            /* set by gbt_train_def_default() */
 } gbt_train_def;
@@ -135,8 +135,8 @@ gbt_status gbt_train(const char *data, const char *run, const gbt_train_def *def
 /**
  * gbt_train() with its settings as text, for other languages and for scripts.
  *
- * @param settings [in] lines "key = value" with the keys of RUN/config; keys that are missing have the values
- *                      of gbt_train_def_default()
+ * @param settings [in] lines "key = value" with the keys of RUN/config, "" for none; keys that are missing
+ *                      have the values of gbt_train_def_default()
  * @return as gbt_train(); GBT_ERR_FORMAT ("settings:LINE: ...") for a line that is not a valid setting
  * Threads: as gbt_train().
  */
@@ -197,7 +197,7 @@ size_t gbt_train_setting_count(void);
 const gbt_train_setting *gbt_train_setting_at(size_t index);
 
 /** Number of threads for all later calls, clamped to [1, 1024]. Default: the processors available to this
-    process, at most its control group's quota. */
+    process, at most its control group's quota. Threads: not while another call runs. */
 void gbt_set_threads(int threads);
 
 /**
@@ -206,7 +206,9 @@ void gbt_set_threads(int threads);
  * that cannot be moved to files may still exceed the limit. gbt_train() with gbt_train_def.memory sets such a
  * limit while it runs; a limit set before is gone afterwards.
  *
+ * @param folder [in] not used when `bytes` is 0
  * @return GBT_OK, or GBT_ERR_IO when no file can be created there
+ * Threads: not while another call runs.
  */
 gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err);
 

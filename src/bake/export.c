@@ -9,6 +9,7 @@
 
 #include "bake/backdrop.h"
 #include "bake/bake.h"
+#include "bake/export_def.h"
 #include "bake/export_folder.h"
 #include "bake/refine.h"
 #include "base/clock.h"
@@ -25,14 +26,9 @@
 #include "run/loaded_run.h"
 #include "train/near_distance.h"
 
-enum { OUTPUTS_MAX = 16, VIEWS_MAX = 16 };
+enum { VIEWS_MAX = 16 };
 
 static const double near_loss_db = 0.5; /* a larger loss gives a warning */
-
-gbt_export_def gbt_export_def_default(void)
-{
-    return (gbt_export_def){.sh_degree = 3, .refine_steps = 500, .backdrop = true, .cookie_ = DEF_COOKIE};
-}
 
 /* One output, and how well it reproduces the model: PSNR in dB of 8-bit images, means over views. */
 typedef struct exported {
@@ -54,7 +50,7 @@ typedef struct exporting {
     bool baked, backdrop;
     trace_settings viewer;    /* how other programs draw files: on black */
     gaussian_cloud clouds[2]; /* with the requested SH degree, and with degree 0 */
-    exported files[OUTPUTS_MAX];
+    exported files[EXPORT_OUTPUTS_MAX];
     size_t file_count;
     size_t unseen, thinned;
     double origin[3], bake_seconds, refine_seconds, model_to_photo;
@@ -245,84 +241,6 @@ static gbt_status compare(exporting *e, gbt_error *err)
 
 /* ---- entry ---- */
 
-/* Check that a file can be written at `path`. A file in the result folder is not checked, because that folder
-   is created first and checked itself. */
-static gbt_status check_place(const char *path, const char *folder, gbt_error *err)
-{
-    const size_t length = folder != NULL ? strlen(folder) : 0;
-    if (path == NULL ||
-        (length > 0 && strncmp(path, folder, length) == 0 && strchr(path + length, '/') == NULL))
-        return GBT_OK;
-    return file_check_creatable(path, err);
-}
-
-static gbt_status check_places(const char *input, const char *json, const char *const *outputs,
-                               size_t output_count, gbt_error *err)
-{
-    const char *folder = NULL;
-    for (size_t i = 0; i < output_count; i++)
-        for (size_t k = 0; k <= i; k++) {
-            const char *other = k < i ? outputs[k] : json;
-            if (other != NULL && file_is_one(other, outputs[i]))
-                return base_fail(err, GBT_ERR_ARGUMENT,
-                                 "%s: would be written twice (each output must be another file)", other);
-        }
-    char trained[4096];
-    GBT_TRY(file_join(trained, sizeof trained, input, "model.gbt", err));
-    if (json != NULL && (file_is_same(json, input) || file_is_same(json, trained)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
-                         json);
-    for (size_t i = 0; i < output_count; i++)
-        folder = export_folder_is(outputs[i]) ? outputs[i] : folder;
-    if (folder != NULL)
-        GBT_TRY(file_check_folder_creatable(folder, err));
-    for (size_t i = 0; i < output_count; i++)
-        GBT_TRY(check_place(outputs[i], folder, err));
-    return check_place(json, folder, err);
-}
-
-/* Reject options that have no meaning for plain Gaussians, which are only converted. */
-static gbt_status check_plain(const char *input, const gbt_export_def *def, gbt_error *err)
-{
-    const gbt_export_def usual = gbt_export_def_default();
-    const char *const field = def->gaussians != 0                       ? "gaussians"
-                              : def->refine_steps != usual.refine_steps ? "refine_steps"
-                              : def->backdrop != usual.backdrop         ? "backdrop"
-                              : def->data != NULL                       ? "data"
-                                                                        : NULL;
-    if (field != NULL)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%s: does not apply to plain Gaussians, as in %s (wanted a trained model)", field,
-                         input);
-    return GBT_OK;
-}
-
-static gbt_status check(const char *input, const gbt_export_def *def, const char *const *outputs,
-                        size_t output_count, gbt_error *err)
-{
-    if (def->sh_degree < 0 || def->sh_degree > 3)
-        return base_fail(err, GBT_ERR_ARGUMENT, "sh_degree: %d (wanted 0 to 3)", def->sh_degree);
-    if (def->refine_steps < 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "refine_steps: %d (wanted 0 or more)", def->refine_steps);
-    if (def->gaussians < 0)
-        return base_fail(err, GBT_ERR_ARGUMENT, "gaussians: %d (wanted 0 or more)", def->gaussians);
-    if (gaussian_file_readable(input))
-        GBT_TRY(check_plain(input, def, err));
-    if (output_count < 1 || output_count > OUTPUTS_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: %zu files to write (wanted 1 to %d)", input,
-                         output_count, (int)OUTPUTS_MAX);
-    size_t folders = 0;
-    for (size_t i = 0; i < output_count; i++) {
-        folders += export_folder_is(outputs[i]);
-        if (!export_folder_is(outputs[i]))
-            GBT_TRY(gaussian_file_check_writable(outputs[i], err));
-    }
-    if (folders > 1 || (folders == 1 && gaussian_file_readable(input)))
-        return base_fail(err, GBT_ERR_ARGUMENT, "%s: wanted a run as input, and one result folder at most",
-                         input);
-    return check_places(input, def->json, outputs, output_count, err);
-}
-
 static void say_source(const exporting *e, const gaussian_cloud *cloud, const char *input, FILE *report)
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
@@ -466,7 +384,7 @@ gbt_status gbt_export(const char *input, const gbt_export_def *def, const char *
 {
     PLAIN_NUMBERS;
     GBT_TRY(def_check(def->cookie_, "gbt_export_def_default", err));
-    GBT_TRY(check(input, def, outputs, output_count, err));
+    GBT_TRY(export_check(input, def, outputs, output_count, err));
     exporting *e = mem_calloc(1, sizeof *e, "export", err);
     if (e == NULL)
         return GBT_ERR_NO_MEMORY;

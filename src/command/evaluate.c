@@ -46,10 +46,10 @@ static void log_scores(const evaluation *e)
     log_info("%zu held-out views: PSNR %.3f dB, SSIM %.4f, FLIP %.4f%s%s", e->view_count, e->psnr, e->ssim,
              e->flip, more, e->exposure ? ", of their right halves" : "");
     if (!e->exposure && e->psnr_fitted > e->psnr + EXPOSURE_HINT)
-        log_info("with the colours of held-out photos fitted PSNR is %.2f dB: they may differ in exposure "
-                 "from the "
-                 "scene (docs/metrics.md)",
-                 e->psnr_fitted);
+        log_info(
+            "with the colours of held-out photos fitted PSNR is %.2f dB: they may differ in exposure from "
+            "the scene (docs/metrics.md)",
+            e->psnr_fitted);
 }
 
 /**

@@ -580,6 +580,7 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply o.ply
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply --json o.ply
     misuse 2 "plain.ply: would be overwritten (--json must be another file)" export plain.ply o.ply --json plain.ply
+    misuse 2 "./plain.ply: would be overwritten (the output must be another file)" export plain.ply o.ply ./plain.ply
     misuse 2 "--data: cannot be combined with a camera file or a path file (which give the cameras)" render plain.ply -o drawn --data made --camera x.json
     misuse 2 "--data: cannot be combined with a camera file or a path file (which give the cameras)" render plain.ply -o drawn --data made --path x.json
     misuse 2 "--gaussians: 1000 (wanted more than the 1000 of the background, or no background)" export run o.ply --gaussians 1000

@@ -74,7 +74,7 @@ class CComparison(c.Structure):
 
 class CEvaluateDef(c.Structure):
     _fields_ = [("data", c.c_char_p), ("json", c.c_char_p), ("renderer", c.c_int), ("downscale", c.c_double), ("report", c.c_bool),
-                ("preset", c.c_int), ("tensorboard", c.c_bool), ("lpips", c.c_char_p), ("cookie_", c.c_uint32)]
+                ("preset", c.c_int), ("tensorboard", c.c_bool), ("lpips", c.c_char_p), ("after_training", c.c_bool), ("cookie_", c.c_uint32)]
 
 
 class CExportDef(c.Structure):

@@ -200,11 +200,10 @@ static void place_camera(int view, int view_count, double eye[3], double target[
 const recipe recipe_district = {
     .name = "district",
     .summary = "64 blocks of houses along 14 streets, walked and flown over: for large scenes",
-    .about =
-        "A district of 8 x 8 blocks of gabled houses with yards and trees between straight streets, 190 "
-        "units "
-        "across. Two of three cameras stand in the streets at eye level, the others fly over the "
-        "roofs; each sees a small part of the district. A sphere of 190 units around it carries the sky.",
+    .about = "A district of 8 x 8 blocks of gabled houses with yards and trees between straight streets, "
+             "190 units across. Two of three cameras stand in the streets at eye level, the others fly "
+             "over the roofs; each sees a small part of the district. A sphere of 190 units around it "
+             "carries the sky.",
     .build = build,
     .place_camera = place_camera,
     .jitter = 0.2f,

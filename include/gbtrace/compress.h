@@ -29,14 +29,14 @@ gbt_compress_def gbt_compress_def_default(void);
  * Write a trained model in a compressed form, which every command reads like the uncompressed one
  * (docs/compression.md).
  *
- * Quantisation steps come from adjoint passes through the training views (the photos are not needed). When
+ * Quantization steps come from adjoint passes through the training views (the photos are not needed). When
  * the data set is not there, they come from the model alone, with a line on stderr: the file is then some 5
  * to 40 % larger at the same loss. When one anchor is so far from the others that rounding positions would
  * cost more than that quality, the model is stored without loss, with a warning. The file is decoded and
  * checked before it is written.
  *
  * A file that is already compressed is copied unchanged: always with `lossless`, otherwise when it is
- * quantised and `quality` is not below the default (a file does not record the quality it was made with).
+ * quantized and `quality` is not below the default (a file does not record the quality it was made with).
  * When `out` is that file, nothing is done.
  *
  * @param run [in] RUN (a folder with model.gbt) or a model file

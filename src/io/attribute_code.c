@@ -13,9 +13,9 @@ gbt_status attribute_table_make(attribute_table *t, size_t rows, int columns, gb
 {
     *t = (attribute_table){.rows = rows, .columns = columns};
     const size_t cells = (size_t)columns * sizeof *t->value;
-    t->value = mem_calloc(rows, cells, "quantised attributes", err);
-    t->abs_error = mem_calloc(rows, cells, "quantised attributes", err);
-    t->doubling = mem_calloc(rows, sizeof *t->doubling, "quantised attributes", err);
+    t->value = mem_calloc(rows, cells, "quantized attributes", err);
+    t->abs_error = mem_calloc(rows, cells, "quantized attributes", err);
+    t->doubling = mem_calloc(rows, sizeof *t->doubling, "quantized attributes", err);
     t->near = mem_calloc(rows, sizeof *t->near, "neighbours", err);
     t->rule = mem_calloc((size_t)columns, sizeof *t->rule, "prediction rules", err);
     return t->value == NULL || t->abs_error == NULL || t->doubling == NULL || t->near == NULL ||

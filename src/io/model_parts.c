@@ -151,7 +151,7 @@ static gbt_status fill_coarse(model_parts *p, const model *m, const model_steps 
     placed *order;
     if (steps->doubling != NULL && steps->count != p->count)
         return base_fail(err, GBT_ERR_ARGUMENT,
-                         "quantisation steps of another model (wanted %zu anchors, got %zu)", p->count,
+                         "quantization steps of another model (wanted %zu anchors, got %zu)", p->count,
                          steps->count);
     GBT_TRY(sort_anchors(p, m, steps->position, &order, err));
     for (size_t i = 0; i < p->count; i++) {

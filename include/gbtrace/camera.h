@@ -133,8 +133,8 @@ bool gbt_camera_every(const gbt_camera *camera, int step, int x, int y, gbt_came
  */
 bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_camera *out);
 
-/** The camera of a part of the image: `width` x `height` pixels, both >= 1, with pixel (x, y) of this image
-    at the top left; it may reach beyond the image. Returns false as gbt_camera_shifted() does. */
+/** The camera of a part of the image: `width` x `height` pixels with pixel (x, y) of this image at the top
+    left; it may reach beyond the image. Returns false as gbt_camera_shifted() does, or without a pixel. */
 bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out);
 
 /**

@@ -92,9 +92,9 @@ static void add_tables(const void *study, text *out)
     const grid_study *s = study;
     text_format(out,
                 "# Anchors against held-out PSNR\n\n%llu iterations of the default settings, photos divided "
-                "by %g, seeds 0 to %d, held-out photos: %s.\n",
-                (unsigned long long)s->def.iterations, s->def.downscale, s->grid.seeds - 1,
-                s->def.eval_split);
+                "by %g, ",
+                (unsigned long long)s->def.iterations, s->def.downscale);
+    study_grid_add_runs(&s->grid, s->def.eval_split, out);
     text_format(out,
                 "Mean ± standard deviation over the seeds. Times smaller: model.gbt against %d bytes, as the "
                 "paper counts, for each final anchor of the voxels. The voxels are those of the first row. ",

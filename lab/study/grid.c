@@ -43,6 +43,15 @@ void study_grid_close(study_grid *g)
     g->figures = NULL;
 }
 
+void study_grid_add_runs(const study_grid *g, const char *eval_split, text *out)
+{
+    if (g->seeds == 1)
+        text_add(out, "seed 0");
+    else
+        text_format(out, "seeds 0 to %d", g->seeds - 1);
+    text_format(out, ", held-out photos: %s.\n", eval_split);
+}
+
 /* Report that run `number` of `count` begins; numbers start at 1. */
 static void tell(size_t number, size_t count)
 {

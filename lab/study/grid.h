@@ -32,6 +32,9 @@ static inline study_figures *study_grid_at(const study_grid *g, size_t place, si
     return &g->figures[(place * g->variant_count + variant) * (size_t)g->seeds + (size_t)seed];
 }
 
+/** Adds "seed 0" or "seeds 0 to 2", and which photos are held out. */
+void study_grid_add_runs(const study_grid *g, const char *eval_split, text *out);
+
 /** A study that consists of a grid and nothing else. */
 typedef struct grid_study {
     lab_runs_def def; /* strings borrowed */

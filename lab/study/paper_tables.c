@@ -161,7 +161,7 @@ void paper_tables(const void *study, text *out)
                 CHOICE_NAME(GBT_RENDERER_NAMES, s->def.renderer));
     if (s->def.voxel_size > 0)
         text_format(out, "voxel size %g, ", s->def.voxel_size);
-    text_format(out, "seeds 0 to %d; held-out photos: %s.\n", s->grid.seeds - 1, s->def.eval_split);
+    study_grid_add_runs(&s->grid, s->def.eval_split, out);
     text_add(out, "Mean ± standard deviation over the seeds. Changes compare runs of the same seed; \"all\" "
                   "is the mean of the scenes' changes, the paper's the change of the sum over its scenes. "
                   "Told apart: outside the 95 % interval of the mean. " STAT_BOLD_MEANS

@@ -92,7 +92,7 @@ static void add_tables(const void *study, text *out)
                 "# Held-out PSNR against seconds\n\nA budget is %.4g s; the faithful protocol has %g of "
                 "them. Photos divided by %g, ",
                 s->def.budget_seconds, time_variants[TIME_FAITHFUL].budgets, s->def.downscale);
-    text_format(out, "seeds 0 to %d, held-out photos: %s.\n", s->grid.seeds - 1, s->def.eval_split);
+    study_grid_add_runs(&s->grid, s->def.eval_split, out);
     text_add(out, "Mean ± standard deviation over the seeds. Marks are taken in passing, while the clock "
                   "stops: schedules end with the budget, so a run of half the budget has more than the mark "
                   "at half. Each run but the first two leaves one choice of the default out. " STAT_BOLD_MEANS

@@ -93,7 +93,7 @@ bool gbt_camera_shifted(const gbt_camera *camera, double dx, double dy, gbt_came
 bool gbt_camera_cropped(const gbt_camera *camera, int x, int y, int width, int height, gbt_camera *out)
 {
     gbt_camera shifted;
-    if (!gbt_camera_shifted(camera, x, y, &shifted))
+    if (width < 1 || height < 1 || !gbt_camera_shifted(camera, x, y, &shifted))
         return false;
     *out = camera_of_readout_part(&shifted, 0, 0, width, height);
     out->width = width;

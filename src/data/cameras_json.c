@@ -9,9 +9,9 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "base/file.h"
 #include "base/memory.h"
 #include "base/vec.h"
+#include "data/json_fields.h"
 #include "data/raw.h"
 
 static bool get_number(const json_t *value, double *out)
@@ -96,14 +96,8 @@ static gbt_status read_list(const json_t *list, const char *path, scene *out, gb
 gbt_status cameras_json_load(const char *path, scene *out, gbt_error *err)
 {
     memset(out, 0, sizeof *out);
-    unsigned char *bytes;
-    size_t size;
-    json_error_t fault;
-    GBT_TRY(file_read(path, &bytes, &size, err));
-    json_t *root = json_loadb((const char *)bytes, size, 0, &fault);
-    mem_free(bytes);
-    if (root == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", path, fault.line, fault.text);
+    json_t *root;
+    GBT_TRY(json_read_list(path, &root, err));
     gbt_status status = read_list(root, path, out, err);
     json_decref(root);
     if (status == GBT_OK) {

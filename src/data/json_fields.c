@@ -10,17 +10,8 @@
 #include "base/file.h"
 #include "base/memory.h"
 
-gbt_status json_read(const char *path, json_t **out, gbt_error *err)
-{
-    unsigned char *bytes;
-    size_t count;
-    GBT_TRY(file_read(path, &bytes, &count, err));
-    const gbt_status status = json_read_text((const char *)bytes, count, path, out, err);
-    mem_free(bytes);
-    return status;
-}
-
-gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err)
+static gbt_status parse(const char *text, size_t length, const char *name, json_type type, json_t **out,
+                        gbt_error *err)
 {
     json_error_t where;
     const size_t mark = file_mark_bytes(text, length);
@@ -32,10 +23,37 @@ gbt_status json_read_text(const char *text, size_t length, const char *name, jso
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", name);
     if (*out == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", name, where.line, where.text);
-    if (json_is_object(*out))
+    if (json_typeof(*out) == type)
         return GBT_OK;
     json_decref(*out);
-    return base_fail(err, GBT_ERR_FORMAT, "%s: wanted a JSON object", name);
+    *out = NULL;
+    return base_fail(err, GBT_ERR_FORMAT, "%s: wanted a JSON %s", name,
+                     type == JSON_OBJECT ? "object" : "list");
+}
+
+static gbt_status read_file(const char *path, json_type type, json_t **out, gbt_error *err)
+{
+    unsigned char *bytes;
+    size_t count;
+    GBT_TRY(file_read(path, &bytes, &count, err));
+    const gbt_status status = parse((const char *)bytes, count, path, type, out, err);
+    mem_free(bytes);
+    return status;
+}
+
+gbt_status json_read(const char *path, json_t **out, gbt_error *err)
+{
+    return read_file(path, JSON_OBJECT, out, err);
+}
+
+gbt_status json_read_list(const char *path, json_t **out, gbt_error *err)
+{
+    return read_file(path, JSON_ARRAY, out, err);
+}
+
+gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err)
+{
+    return parse(text, length, name, JSON_OBJECT, out, err);
 }
 
 gbt_status json_field_fail(const json_fields *r, const char *field, const char *what)

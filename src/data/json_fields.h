@@ -25,6 +25,9 @@ typedef struct json_fields {
     json_decref(). GBT_ERR_IO, GBT_ERR_FORMAT or GBT_ERR_NO_MEMORY. */
 gbt_status json_read(const char *path, json_t **out, gbt_error *err);
 
+/** json_read() of a file that holds a list. */
+gbt_status json_read_list(const char *path, json_t **out, gbt_error *err);
+
 /** json_read() for text in memory; messages use `name` in place of the file name. */
 gbt_status json_read_text(const char *text, size_t length, const char *name, json_t **out, gbt_error *err);
 

@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "base/memory.h"
+#include "data/json_fields.h"
 #include "data/json_out.h"
 #include "train/event_records.h"
 
@@ -69,16 +70,12 @@ static void add_training(json_t *root, const char *run)
 {
     char path[4096];
     gbt_error ignored = {0};
-    unsigned char *bytes = NULL;
-    size_t count;
+    json_t *training;
     if (file_join(path, sizeof path, run, "train.json", &ignored) != GBT_OK ||
-        file_read(path, &bytes, &count, &ignored) != GBT_OK)
+        json_read(path, &training, &ignored) != GBT_OK)
         return;
-    json_t *training = json_loadb((const char *)bytes, count, 0, NULL);
-    if (json_is_object(training))
-        json_object_update_missing(root, training);
+    json_object_update_missing(root, training);
     json_decref(training);
-    mem_free(bytes);
 }
 
 json_t *score_files_json(const evaluation *e, const char *run)

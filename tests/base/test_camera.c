@@ -672,6 +672,8 @@ static void parts_of_a_rolling_image(void **state)
         assert_true(gbt_camera_every(&camera, 3, 1, 2, &some[0]));
         assert_true(gbt_camera_shifted(&camera, 0.25, -0.375, &some[1]));
         assert_true(gbt_camera_cropped(&camera, 200, 120, 64, 48, &some[2]));
+        assert_false(gbt_camera_cropped(&camera, 200, 120, 0, 48, &some[3]));
+        assert_false(gbt_camera_cropped(&camera, 200, 120, 64, -1, &some[3]));
         some[3] = gbt_camera_resized(&camera, WIDTH / 4, HEIGHT / 4);
         assert_int_equal(some[2].width, 64);
         assert_int_equal(some[2].height, 48);

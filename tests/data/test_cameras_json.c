@@ -20,6 +20,7 @@ static void cameras(void **state)
         const char *says;
     } cases[] = {
         {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_OK, ""},
+        {"\xEF\xBB\xBF[" CAMERA("a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_OK, ""},
         {"[" CAMERA("a", "[[0,0,1],[1,0,0],[0,2,0]]") "]", GBT_ERR_FORMAT, "frame 0: not a rotation"},
         {"[" CAMERA("a", "[[0,0,1],[-1,0,0],[0,1,0]]") "]", GBT_ERR_FORMAT, "no reflection"},
         {"[" CAMERA("../a", "[[0,0,1],[1,0,0],[0,1,0]]") "]", GBT_ERR_FORMAT, "'..'"},
@@ -27,8 +28,10 @@ static void cameras(void **state)
         {"[{}]", GBT_ERR_FORMAT, "not a camera"},
         {"[7]", GBT_ERR_FORMAT, "not a camera"},
         {"[]", GBT_ERR_FORMAT, "no cameras"},
-        {"{}", GBT_ERR_FORMAT, "no cameras"},
-        {"", GBT_ERR_FORMAT, "not usable JSON"},
+        {"{}", GBT_ERR_FORMAT, "wanted a JSON list"},
+        {"[{", GBT_ERR_FORMAT, "not usable JSON"},
+        {"[{\"fx\": 1, \"fx\": 2}]", GBT_ERR_FORMAT, "duplicate"},
+        {"", GBT_ERR_FORMAT, "file is empty"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         write_text(in_folder("cameras.json"), cases[i].text);

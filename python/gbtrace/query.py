@@ -109,7 +109,7 @@ class Balls:
         answers = lib.CAnswers()
         try:
             lib.call(name, self._c, *arguments, c.byref(answers))
-            first = _copy(answers.first, (answers.count + 1,), np.uintp)
+            first = _copy(answers.first, (answers.count + 1,), np.intp)
             count = int(first[-1])
             return Answers(first, _copy(answers.index, (count,), np.uint32), _copy(answers.value, (count,), np.float64))
         finally:

@@ -71,6 +71,7 @@ class Balls(unittest.TestCase):
                 np.testing.assert_array_equal(answers[i], np.flatnonzero(wanted[i]))
                 np.testing.assert_array_equal(answers[i - 60], answers[i])
             self.assertEqual([which.tolist() for which in answers], [answers[i].tolist() for i in range(60)])
+            np.testing.assert_array_equal(np.repeat(np.arange(60), np.diff(answers.first)), np.nonzero(wanted)[0])
             for i in (60, -61):
                 with self.assertRaisesRegex(IndexError, rf"query {i} \(there are 60\)"):
                     answers[i]

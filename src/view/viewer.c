@@ -25,13 +25,15 @@ static bool is_same_file(const struct stat *a, const struct stat *b)
 static gbt_status open_run(viewer_state *s, loaded_run *run, char *note, size_t note_size, gbt_error *err)
 {
     gbt_error first = {0};
-    const gbt_status status = loaded_run_open(s->input, s->data, 0, run, &first);
     note[0] = '\0';
+    GBT_TRY(loaded_run_open_model(s->input, run, err));
+    run->data_is_known = s->run != NULL;
+    const gbt_status status = loaded_run_open_views(s->input, s->data, 0, run, &first);
     if (status == GBT_OK)
         return GBT_OK;
-    loaded_run_close(run);
     if (s->data != NULL)
         return base_fail(err, status, "%s", first.text);
+    loaded_run_close(run);
     GBT_TRY(loaded_run_open_model(s->input, run, err));
     const bool hint = loaded_run_cut_hint(first.text);
     if (run->cloud.count == 0)

@@ -96,8 +96,8 @@ run pointless-run pointless
 run picked plain --step-pixels 768 # every third across and down
 run sky plain --background sky --views 2
 run poses plain --refine-poses --exposure --views 2
-steps=1400 # so many looks at each photo that steps leave anchors out
-run long plain
+steps=560 # so many looks at each photo that steps leave anchors out
+run long plain --eval-split every=2
 steps=
 "$program" train plain -o goes-on --iterations 20 --quiet >/dev/null 2>&1
 "$program" train -o goes-on --resume --iterations 40 --lossless --quiet >out 2>&1 || cat out

@@ -34,6 +34,7 @@ int checkpoint_arrays(trainer *t, checkpoint_array out[CHECKPOINT_ARRAYS])
         {"pose.moment1", CONTAINER_F32, 2, {p->count, POSE_NUMBERS}, p->moment1, &p->moment1},
         {"pose.moment2", CONTAINER_F32, 2, {p->count, POSE_NUMBERS}, p->moment2, &p->moment2},
         {"pose.visits", CONTAINER_U64, 1, {p->count, 1}, p->visits, &p->visits},
+        {"pose.began", CONTAINER_U64, 1, {p->count > 0, 1}, &t->began, NULL},
         {"sky.values", CONTAINER_F32, 2, {sky_rows, 3}, s->packed, NULL},
         {"sky.moment1", CONTAINER_F32, 2, {sky_rows, 3}, s->first, NULL},
         {"sky.moment2", CONTAINER_F32, 2, {sky_rows, 3}, s->second, NULL},

@@ -17,7 +17,7 @@ typedef struct checkpoint_array {
                       trainer */
 } checkpoint_array;
 
-enum { CHECKPOINT_ARRAYS = 11 };
+enum { CHECKPOINT_ARRAYS = 12 };
 
 /** The sections that this trainer needs; returns their number. Poses and sky are packed by poses_pack() and
     sky_pack(). */

@@ -28,11 +28,11 @@ enum {
 };
 enum { VIEWS_MIN = 2 };
 
-/* Is `step` between `from` and the end of growth, at a time when geometry may change? */
+/* Is `step` between `from`, counted from where the model begins, and the end of growth? */
 static bool is_within(const trainer *t, uint64_t step, double from)
 {
     const double progress = train_rules_progress(&t->rules, &t->pace, step);
-    from = fmax(from, t->rules.geometry_from);
+    from += t->rules.begins_at;
     if (!t->def.grow)
         return false;
     if (!t->rules.counts_from_one)
@@ -196,7 +196,8 @@ gbt_status growing_round(trainer *t, gbt_error *err)
     known_points known = {0};
     growth_result result = {0};
     gbt_status status = GBT_OK;
-    if (t->rules.grows_at_points && def.grow && pace_progress(&t->pace, t->step) < SCHEDULE_POINTS_UNTIL)
+    if (t->rules.grows_at_points && def.grow &&
+        pace_progress(&t->pace, t->step) < t->rules.begins_at + SCHEDULE_POINTS_UNTIL)
         status = find_points(t, &known, &def.points, err);
     if (status == GBT_OK)
         status = growth_round(&t->anchors, &t->stats, &def, &result, err);

@@ -64,7 +64,7 @@ learning_rates learning_rates_at(const learning_rates_def *def)
         factor *= cool_end + (1 - cool_end) * fmax(1 - def->progress, 0) / (1 - SCHEDULE_COOL_FROM);
     for (int f = ANCHOR_FIRST_LEARNED; f < ANCHOR_FIELDS; f++)
         rates.anchor[f] = rate_at(&anchor_rules[f], def, factor);
-    if (def->progress < def->geometry_from)
+    if (def->geometry_stays)
         rates.anchor[ANCHOR_OFFSET] = rates.anchor[ANCHOR_SCALE_LOG] = 0;
     for (int i = 0; i < DECODER_NETWORKS; i++)
         rates.network[i] = rate_at(&network_rules[i], def, factor);

@@ -33,14 +33,14 @@ typedef struct learning_rates {
 
 /** What the rates of a step depend on. */
 typedef struct learning_rates_def {
-    double progress;      /* train_rules_progress() */
-    bool uses_own_rates;  /* our higher rates, for runs of some thousand steps; false: the reference's */
-    double geometry_from; /* the rates of offsets and scales are 0 before this progress */
-    double extent;        /* camera extent; the reference's rate of offsets is proportional to it */
-    double factor;        /* multiplies all rates */
-    double end;           /* with `own`: schedule_rate_end(), the final fraction of rates that have no end
-                             value in the table */
-    int views;            /* of a step */
+    double progress;     /* train_rules_progress() */
+    bool uses_own_rates; /* our higher rates, for runs of some thousand steps; false: the reference's */
+    bool geometry_stays; /* the rates of offsets and scales are 0 */
+    double extent;       /* camera extent; the reference's rate of offsets is proportional to it */
+    double factor;       /* multiplies all rates */
+    double end;          /* with `own`: schedule_rate_end(), the final fraction of rates that have no end
+                            value in the table */
+    int views;           /* of a step */
 } learning_rates_def;
 
 /** Rates decay log-linearly and, from SCHEDULE_COOL_FROM on, in addition linearly to nearly 0

@@ -10,7 +10,7 @@
 
 static train_rules own_rules(const gbt_train_def *def)
 {
-    const double geometry_from = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0;
+    const double begins_at = def->refine_poses ? SCHEDULE_POSES_SETTLED : 0;
     return (train_rules){
         .offsets = 2,           /* fewer than in the reference: better models at equal time */
         .ball_scale_factor = 2, /* the ball prior gives scales below the spacing of the balls */
@@ -31,11 +31,11 @@ static train_rules own_rules(const gbt_train_def *def)
         .splats_until = def->splats_until,
         .loose_rays = true,
         .leaves_out = true,
-        .raises_until = fmax(SCHEDULE_ADJUST_FROM, geometry_from), /* anchors grow from there */
+        .raises_until = begins_at + SCHEDULE_ADJUST_FROM, /* anchors grow from there */
         .opaque_from = SCHEDULE_OPAQUE_FROM,
         .last_step_learns = true,
         .own_rates = true,
-        .geometry_from = geometry_from,
+        .begins_at = begins_at,
         .anchors_learn_when_adjusted = true,
         .importance = GROWTH_BY_SHARE,
         .gradient_counting = GROWTH_COUNT_BLENDED,

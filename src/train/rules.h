@@ -56,8 +56,9 @@ typedef struct train_rules {
     double opaque_from;    /* progress from which half of the views have a random background, so that
                               surfaces become opaque; HUGE_VAL: never */
     bool own_rates;        /* our higher learning rates, which fall to nearly 0 at the end */
-    double geometry_from;  /* progress from which offsets and scales are trained, and anchors may grow and be
-                              pruned */
+    double begins_at;      /* progress at which the model begins, once poses have settled: before it, offsets
+                              and scales do not change; at it, networks and features start again; growth is
+                              that much later */
     bool anchors_learn_when_adjusted; /* false: anchors skip the optimizer step in which growth adjusts
                                          them */
 

@@ -91,13 +91,13 @@ float schedule_left_out(double looks);
  */
 #define SCHEDULE_COOL_FROM 0.9
 
-/** Progress from which growth statistics are gathered, and from which anchors grow and are pruned. */
+/** With --refine-poses, progress until which only poses are wanted (rules.begins_at). */
+#define SCHEDULE_POSES_SETTLED 0.1
+/** Counted from rules.begins_at: progress from which growth statistics are gathered, and from which anchors
+    grow and are pruned. */
 #define SCHEDULE_STATS_FROM (500.0 / 30000)
 #define SCHEDULE_ADJUST_FROM (1500.0 / 30000)
-/** With --refine-poses, progress until which only poses settle while anchors stay as they start: none moves,
-    grows or is pruned. */
-#define SCHEDULE_POSES_SETTLED 0.1
-/** Progress until which sparse points are growth candidates, too: the start leaves most of them out. */
+/** Likewise, until which sparse points are growth candidates, too: the start leaves most of them out. */
 #define SCHEDULE_POINTS_UNTIL 0.15
 
 #endif

@@ -2,6 +2,7 @@
 /* train/setup.c -- prepare a run up to its first step: anchors, networks, and the rest of the state. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "anchor/init.h"
 #include "base/compare.h"
@@ -61,12 +62,15 @@ static gbt_status measure_distances(trainer *t, float *p5, float *median, float 
 static gbt_status start_features(trainer *t, gbt_error *err)
 {
     const scene_points *points = &t->scene.points;
+    memset(t->anchors.feature, 0, t->anchors.count * ANCHOR_FEATURE_DIM * sizeof *t->anchors.feature);
+    if (!t->rules.features_from_colors || !points->has_color || points->count == 0)
+        return GBT_OK;
     uint32_t *nearest = mem_alloc(t->anchors.count, sizeof *nearest, "features", err);
     if (nearest == NULL)
         return GBT_ERR_NO_MEMORY;
     const gbt_status status = points_find_nearest(points->position, points->count, t->anchors.position,
                                                   t->anchors.count, nearest, NULL, err);
-    for (size_t i = 0; i < t->anchors.count && status == GBT_OK && points->count > 0; i++)
+    for (size_t i = 0; i < t->anchors.count && status == GBT_OK; i++)
         for (size_t c = 0; c < 3; c++)
             t->anchors.feature[i * ANCHOR_FEATURE_DIM + c] =
                 2 * points->color[3 * (size_t)nearest[i] + c] - 1;
@@ -126,7 +130,7 @@ static gbt_status make_anchors(trainer *t, gbt_error *err)
             "max_anchors: the sparse points alone make %zu anchors, so none is added in training (the limit "
             "is %llu)",
             t->anchors.count, (unsigned long long)t->def.max_anchors);
-    return t->rules.features_from_colors && points->has_color ? start_features(t, err) : GBT_OK;
+    return start_features(t, err);
 }
 
 static gbt_status make_state(trainer *t, gbt_error *err)
@@ -163,6 +167,13 @@ static gbt_status make_views(trainer *t, gbt_error *err)
     return GBT_OK;
 }
 
+static gbt_status start_networks(const trainer *t, bool has_distance, decoder *out, gbt_error *err)
+{
+    uint32_t words[4];
+    rng_philox(t->def.seed, RNG_STREAM_NETWORKS, 0, words);
+    return decoder_init(out, t->def.offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err);
+}
+
 /* Random network weights, and the values that follow from the anchors' distances: the unit of the distance
    input, t_near, and the range of scales. */
 static gbt_status make_decoder(trainer *t, gbt_error *err)
@@ -175,9 +186,7 @@ static gbt_status make_decoder(trainer *t, gbt_error *err)
     const bool has_distance =
         def->distance == GBT_DISTANCE_INPUT_ON ||
         (def->distance == GBT_DISTANCE_INPUT_AUTO && wide && t->rules.distance_where_wide);
-    uint32_t words[4];
-    rng_philox(def->seed, RNG_STREAM_NETWORKS, 0, words);
-    GBT_TRY(decoder_init(&t->decoder, def->offsets, has_distance, (uint64_t)words[1] << 32 | words[0], err));
+    GBT_TRY(start_networks(t, has_distance, &t->decoder, err));
     t->distance = (double)median;
     t->decoder.distance_scale = t->rules.distance_by_median ? 1 / median : 1.0f;
     t->decoder.distance_min = p5 * t->decoder.distance_scale;
@@ -259,4 +268,17 @@ gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, 
     GBT_TRY(make_state(t, err));
     choose_background(t);
     return GBT_OK;
+}
+
+gbt_status trainer_begin_again(trainer *t, gbt_error *err)
+{
+    decoder first = {0};
+    GBT_TRY(start_networks(t, t->decoder.has_distance, &first, err));
+    memcpy(t->decoder.params, first.params, first.param_count * sizeof *first.params);
+    decoder_free(&first);
+    learnables_zero(&t->moment1, t->decoder.param_count);
+    learnables_zero(&t->moment2, t->decoder.param_count);
+    memset(t->created, 0, t->anchors.count * sizeof *t->created);
+    t->anchor_t = 0;
+    return start_features(t, err);
 }

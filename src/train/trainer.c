@@ -187,6 +187,16 @@ static void gather_alone(trainer *t)
                         step_view_near(t, v));
 }
 
+static bool has_begun(const trainer *t) { return t->rules.begins_at == 0 || t->began > 0; }
+
+static gbt_status begin_when_due(trainer *t, double progress, gbt_error *err)
+{
+    if (has_begun(t) || progress < t->rules.begins_at)
+        return GBT_OK;
+    t->began = t->step;
+    return trainer_begin_again(t, err);
+}
+
 gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
 {
     stage_clock start = stage_begin();
@@ -195,10 +205,11 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
                  views = t->def.views, all_views = views * pace_expected(&t->pace, t->step);
     const bool learns = t->rules.last_step_learns || next < 1,
                leaves_out = t->rules.leaves_out && train_rules_are_loose(&t->rules, progress);
+    GBT_TRY(begin_when_due(t, progress, err));
     const learning_rates rates = learning_rates_at(
         &(learning_rates_def){.progress = train_rules_progress(&t->rules, &t->pace, t->step),
                               .uses_own_rates = t->rules.own_rates,
-                              .geometry_from = t->rules.geometry_from,
+                              .geometry_stays = !has_begun(t),
                               .extent = t->extent,
                               .factor = t->def.learning_rate_factor * sqrt(views),
                               .end = schedule_rate_end(all_views),
@@ -226,7 +237,7 @@ gbt_status trainer_step(trainer *t, step_report *out, gbt_error *err)
     const bool adjust = growing_is_due(t);
     const learning_model model = model_of(t);
     if (learns)
-        learn_networks(&model, &rates, t->step + 1);
+        learn_networks(&model, &rates, t->step + 1 - t->began);
     if (learns && (!adjust || t->rules.anchors_learn_when_adjusted))
         learn_anchors(&model, &rates, ++t->anchor_t);
     else

@@ -71,6 +71,7 @@ struct trainer {
                                         schedule_left_out() */
     uint64_t round_step;             /* steps done at the last round of growth */
     uint64_t anchor_t;               /* Adam steps of the per-anchor groups */
+    uint64_t began;                  /* with rules.begins_at, steps done before the model began; 0: not yet */
     uint64_t skipped_steps, skipped_in_row;
     uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian although anchors were visible;
                                               number of times that opacities were raised for it */
@@ -91,6 +92,9 @@ struct trainer {
 
 /** Load the data and make the anchors. Start from {0}; free with trainer_free() after success or failure. */
 gbt_status trainer_open(trainer *t, const char *data, const gbt_train_def *def, gbt_error *err);
+
+/** Networks, features and Adam's state as trainer_open() made them. GBT_OK or GBT_ERR_NO_MEMORY. */
+gbt_status trainer_begin_again(trainer *t, gbt_error *err);
 
 /**
  * One iteration: pick views, render, loss, adjoint, Adam, statistics, grow and prune. The pace must know

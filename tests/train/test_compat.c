@@ -72,7 +72,7 @@ static void rounds_count_what_was_gathered(void **state)
         float first;
     } cases[] = {{1200, false, false, 52}, /* steps 20 to 71 */
                  {2400, false, false, 100},
-                 {3000, false, true, 30},
+                 {1200, false, true, 52}, /* steps 140 to 191 */
                  {WHOLE, true, false, 100}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         trainer t = {.def = def_of(cases[i].compat), .pace = pace_of_iterations(cases[i].steps)};
@@ -119,7 +119,6 @@ static void rates_count_from_one(void **state)
         const learning_rates r = learning_rates_at(
             &(learning_rates_def){.progress = train_rules_progress(&t.rules, &t.pace, t.step),
                                   .uses_own_rates = t.rules.own_rates,
-                                  .geometry_from = t.rules.geometry_from,
                                   .extent = 2,
                                   .factor = 1,
                                   .end = 1,

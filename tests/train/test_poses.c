@@ -110,7 +110,7 @@ static void disturbed_poses_come_back(void **state)
     gbt_camera truth[MOST];
     gbt_train_def def = run_def();
     def.refine_poses = true;
-    def.iterations = 800;
+    def.iterations = 1200;
     open_ok(&t, many_photos(), &def);
     assert_true(t.scene.view_count <= MOST);
     for (size_t i = 0; i < t.scene.view_count; i++) {
@@ -126,9 +126,14 @@ static void disturbed_poses_come_back(void **state)
     const float scale_first = t.anchors.scale_log[0];
     for (uint64_t i = 0; i < def.iterations; i++) {
         step_ok(&t, &report);
-        if (pace_progress(&t.pace, i) < SCHEDULE_POSES_SETTLED)
-            assert_true(t.anchors.count == anchors_first && t.anchors.scale_log[0] == scale_first &&
-                        t.anchors.offset[0] == 0);
+        const double progress = pace_progress(&t.pace, i);
+        if (progress < SCHEDULE_POSES_SETTLED)
+            assert_true(t.anchors.scale_log[0] == scale_first && t.anchors.offset[0] == 0 && t.began == 0 &&
+                        t.anchor_t == i + 1);
+        else
+            assert_true(t.began == def.iterations / 10 && t.anchor_t == i + 1 - t.began);
+        if (progress < SCHEDULE_POSES_SETTLED + SCHEDULE_ADJUST_FROM)
+            assert_int_equal(t.anchors.count, anchors_first);
     }
     assert_true(t.anchors.count != anchors_first);
     assert_ok(align_held_out(&t, NULL));
@@ -136,6 +141,55 @@ static void disturbed_poses_come_back(void **state)
     print_message("training photos turned by %.2f degrees, then %.2f; held-out ones by %.2f, then %.2f\n",
                   before, after, test_before, test_after);
     assert_true(after < 0.5 * before && test_after < 0.7 * test_before);
+    trainer_free(&t);
+}
+
+static void the_model_begins_again(void **state)
+{
+    (void)state;
+    trainer t, fresh;
+    step_report report;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    open_ok(&t, tiny, &def);
+    open_ok(&fresh, tiny, &def);
+    const size_t features = t.anchors.count * ANCHOR_FEATURE_DIM * sizeof(float),
+                 networks = t.decoder.param_count * sizeof(float);
+    for (int i = 0; i < STEPS / 20; i++)
+        step_ok(&t, &report);
+    assert_true(memcmp(t.anchors.feature, fresh.anchors.feature, features) != 0);
+    assert_true(memcmp(t.decoder.params, fresh.decoder.params, networks) != 0);
+    assert_ok(trainer_begin_again(&t, NULL));
+    assert_int_equal(t.anchor_t, 0);
+    assert_memory_equal(t.anchors.feature, fresh.anchors.feature, features);
+    assert_memory_equal(t.decoder.params, fresh.decoder.params, networks);
+    const learnables *const moments[] = {&t.moment1, &t.moment2}, *const none[] = {&fresh.moment1,
+                                                                                   &fresh.moment2};
+    for (int i = 0; i < 2; i++) {
+        assert_memory_equal(moments[i]->networks, none[i]->networks, networks);
+        assert_memory_equal(moments[i]->anchors.feature, none[i]->anchors.feature, features);
+    }
+    trainer_free(&t);
+    trainer_free(&fresh);
+}
+
+/* A longer run does not discard what it has learned when it comes to where it would have begun. */
+static void a_longer_run_does_not_begin_again(void **state)
+{
+    (void)state;
+    trainer t;
+    step_report report;
+    gbt_train_def def = run_def();
+    def.refine_poses = true;
+    open_ok(&t, tiny, &def);
+    for (int i = 0; i < STEPS; i++)
+        step_ok(&t, &report);
+    const uint64_t began = t.began, anchor_t = t.anchor_t;
+    assert_int_equal(began, STEPS / 10);
+    t.pace = pace_of_iterations(11 * STEPS);
+    for (int i = 0; i < STEPS; i++)
+        step_ok(&t, &report);
+    assert_true(t.began == began && t.anchor_t == anchor_t + STEPS);
     trainer_free(&t);
 }
 
@@ -349,6 +403,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_mean_stays),
         cmocka_unit_test(disturbed_poses_come_back),
+        cmocka_unit_test(the_model_begins_again),
+        cmocka_unit_test(a_longer_run_does_not_begin_again),
         cmocka_unit_test(a_run_goes_on_with_its_poses),
         cmocka_unit_test(scoring_leaves_no_pose_behind),
         cmocka_unit_test(a_score_that_a_signal_stops_is_made_later),

@@ -140,14 +140,12 @@ static void rates_follow_the_views(void **state)
     for (t.step = LENGTH / 2; t.step * V % t.train_count != 0;) /* an epoch begins: V photos */
         t.step++;
     const double progress = pace_progress(&t.pace, t.step), step = 1.0 / (V * LENGTH);
-    const learning_rates rates =
-        learning_rates_at(&(learning_rates_def){.progress = progress,
-                                                .uses_own_rates = true,
-                                                .geometry_from = t.rules.geometry_from,
-                                                .extent = t.extent,
-                                                .factor = 2,
-                                                .end = schedule_rate_end(V * LENGTH),
-                                                .views = V});
+    const learning_rates rates = learning_rates_at(&(learning_rates_def){.progress = progress,
+                                                                         .uses_own_rates = true,
+                                                                         .extent = t.extent,
+                                                                         .factor = 2,
+                                                                         .end = schedule_rate_end(V * LENGTH),
+                                                                         .views = V});
     const size_t offsets = t.anchors.count * 3 * (size_t)t.anchors.offset_count, scales = t.anchors.count * 6;
     float *offset = mem_alloc(offsets, sizeof *offset, "test", NULL),
           *scale = mem_alloc(scales, sizeof *scale, "test", NULL);

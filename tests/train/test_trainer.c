@@ -676,7 +676,6 @@ static void new_geometry_begins_at_its_own_pace(void **state)
     const learning_rates rates =
         learning_rates_at(&(learning_rates_def){.progress = pace_progress(&t.pace, t.step),
                                                 .uses_own_rates = true,
-                                                .geometry_from = t.rules.geometry_from,
                                                 .extent = t.extent,
                                                 .factor = t.def.learning_rate_factor,
                                                 .end = 1,
@@ -1421,11 +1420,11 @@ static void pace_is_read(void **state)
     trainer_free(&t);
 }
 
-static learning_rates rates_at(double progress, bool own, double geometry_from, double extent, double end)
+static learning_rates rates_at(double progress, bool own, bool geometry_stays, double extent, double end)
 {
     return learning_rates_at(&(learning_rates_def){.progress = progress,
                                                    .uses_own_rates = own,
-                                                   .geometry_from = geometry_from,
+                                                   .geometry_stays = geometry_stays,
                                                    .extent = extent,
                                                    .factor = 1,
                                                    .end = end,
@@ -1438,7 +1437,7 @@ static void rates_never_rise(void **state)
     double before[6];
     for (int own = 0; own < 2; own++)
         for (int i = 0; i <= 100; i++) { /* positive, finite, and none ever rises */
-            const learning_rates r = rates_at(i / 100.0, own, 0, 2.0, 1);
+            const learning_rates r = rates_at(i / 100.0, own, false, 2.0, 1);
             const double now[6] = {r.anchor[ANCHOR_OFFSET],    r.anchor[ANCHOR_FEATURE],
                                    r.anchor[ANCHOR_SCALE_LOG], r.network[DECODER_OPACITY],
                                    r.network[DECODER_SHAPE],   r.network[DECODER_COLOR]};
@@ -1448,30 +1447,30 @@ static void rates_never_rise(void **state)
                 before[k] = now[k];
             }
         }
-    assert_true(rates_at(1, true, 0, 1, 1).anchor[ANCHOR_FEATURE] <
-                0.05 * rates_at(0.9, true, 0, 1, 1).anchor[ANCHOR_FEATURE]);
-    assert_true(rates_at(1, false, 0, 1, 1).anchor[ANCHOR_FEATURE] ==
-                rates_at(0.9, false, 0, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(rates_at(1, true, false, 1, 1).anchor[ANCHOR_FEATURE] <
+                0.05 * rates_at(0.9, true, false, 1, 1).anchor[ANCHOR_FEATURE]);
+    assert_true(rates_at(1, false, false, 1, 1).anchor[ANCHOR_FEATURE] ==
+                rates_at(0.9, false, false, 1, 1).anchor[ANCHOR_FEATURE]);
     assert_true(schedule_rate_end(1) == 1 && schedule_rate_end(4000) == 1 &&
                 schedule_rate_end(16000) == 0.5 && schedule_rate_end(1e9) == 0.1);
     assert_true(schedule_left_out(0) == 0 && schedule_left_out(100) == 0 &&
                 fabsf(schedule_left_out(300) - 0.2808f) < 1e-4f &&
                 fabsf(schedule_left_out(1000) - 0.4988f) < 1e-4f && schedule_left_out(1e9) < 1);
-    const learning_rates waits = rates_at(0.0499, true, 0.05, 1, 1),
-                         learns = rates_at(0.05, true, 0.05, 1, 1);
+    const learning_rates waits = rates_at(0.05, true, true, 1, 1), learns = rates_at(0.05, true, false, 1, 1);
     assert_true(waits.anchor[ANCHOR_OFFSET] == 0 && waits.anchor[ANCHOR_SCALE_LOG] == 0 &&
                 waits.anchor[ANCHOR_FEATURE] > 0 && waits.network[DECODER_SHAPE] > 0);
     assert_true(learns.anchor[ANCHOR_OFFSET] > 0 && learns.anchor[ANCHOR_SCALE_LOG] > 0);
-    const learning_rates at_last = rates_at(0.9, true, 0, 1, 0.1), flat = rates_at(0.9, true, 0, 1, 1);
+    const learning_rates at_last = rates_at(0.9, true, false, 1, 0.1),
+                         flat = rates_at(0.9, true, false, 1, 1);
     assert_true(at_last.anchor[ANCHOR_SCALE_LOG] < 0.13 * flat.anchor[ANCHOR_SCALE_LOG] &&
                 at_last.anchor[ANCHOR_OFFSET] == flat.anchor[ANCHOR_OFFSET]);
     for (int i = 0; i <= 100; i++) {
-        const learning_rates r = rates_at(i / 100.0, false, 0, 2.0, 1);
+        const learning_rates r = rates_at(i / 100.0, false, false, 2.0, 1);
         assert_true(
-            fabs(r.anchor[ANCHOR_OFFSET] / rates_at(i / 100.0, false, 0, 1.0, 1).anchor[ANCHOR_OFFSET] - 2) <
-            1e-12);
-        assert_true(rates_at(i / 100.0, true, 0, 2.0, 1).anchor[ANCHOR_OFFSET] ==
-                    rates_at(i / 100.0, true, 0, 1.0, 1).anchor[ANCHOR_OFFSET]);
+            fabs(r.anchor[ANCHOR_OFFSET] / rates_at(i / 100.0, false, false, 1.0, 1).anchor[ANCHOR_OFFSET] -
+                 2) < 1e-12);
+        assert_true(rates_at(i / 100.0, true, false, 2.0, 1).anchor[ANCHOR_OFFSET] ==
+                    rates_at(i / 100.0, true, false, 1.0, 1).anchor[ANCHOR_OFFSET]);
     }
 }
 

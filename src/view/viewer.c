@@ -33,8 +33,7 @@ static gbt_status open_run(viewer_state *s, loaded_run *run, char *note, size_t 
         return GBT_OK;
     if (s->data != NULL)
         return base_fail(err, status, "%s", first.text);
-    loaded_run_close(run);
-    GBT_TRY(loaded_run_open_model(s->input, run, err));
+    loaded_run_close_views(run);
     const bool hint = loaded_run_cut_hint(first.text);
     if (run->cloud.count == 0)
         snprintf(note, note_size, "No photos: %.500s%s", first.text,

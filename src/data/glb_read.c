@@ -7,6 +7,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "data/json_fields.h"
+
 typedef struct reading {
     const source_file *file;
     json_t *root;
@@ -32,11 +34,9 @@ static gbt_status read_chunks(reading *r, gbt_error *err)
     if (cursor_u32(&c) != GLB_JSON)
         return wrong(r, "the first chunk is not JSON", err);
     GBT_TRY(cursor_need(&c, json_size, "the JSON of glTF", err));
-    json_error_t why;
-    r->root = json_loadb((const char *)r->file->bytes + c.at, json_size, 0, &why);
-    if (r->root == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: glTF: JSON, line %d: %s", r->file->name, why.line,
-                         why.text);
+    char name[JSON_PATH_SIZE];
+    snprintf(name, sizeof name, "%s: glTF", r->file->name);
+    GBT_TRY(json_read_text((const char *)r->file->bytes + c.at, json_size, name, &r->root, err));
     cursor_skip(&c, json_size);
     GBT_TRY(cursor_need(&c, 8, "the binary chunk of glTF", err));
     r->data_size = cursor_u32(&c);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "data/archive.h"
+#include "data/json_fields.h"
 #include "data/palette.h"
 #include "data/sog.h"
 #include "data/webp.h"
@@ -195,10 +196,12 @@ gbt_status sog_read(const source_file *file, gaussian_cloud *out, gbt_error *err
     size_t size;
     memset(out, 0, sizeof *out);
     GBT_TRY(archive_take(file, "meta.json", &text, &size, err));
-    json_error_t why;
-    b.meta = json_loadb((const char *)text, size, 0, &why);
+    char name[JSON_PATH_SIZE];
+    snprintf(name, sizeof name, "%s: meta.json", file->name);
+    gbt_status status = json_read_text((const char *)text, size, name, &b.meta, err);
     mem_free(text);
-    gbt_status status = b.meta == NULL ? wrong(&b, why.text, err) : read_all(&b, out, err);
+    if (status == GBT_OK)
+        status = read_all(&b, out, err);
     for (int id = 0; id < TABLES; id++)
         mem_free(b.tables[id].bytes);
     json_decref(b.meta);

@@ -235,7 +235,7 @@ static void glb_that_is_wrong(void **state)
         {"\"KHR_gaussian_splatting\":{", "\"KHR_gaussian_splattinx\":{", "no primitive"},
         {"srgb_rec709_display", "lin0_rec709_display", "another space"},
         {"\"colorSpace\":\"srgb_rec709_display\"", "\"extensions\":{\"KHR_compressed\":{}}", "compressed"},
-        {"\"translation\":", "\"translation\" ", "glTF: JSON"},
+        {"\"translation\":", "\"translation\" ", "glTF:1: not usable JSON"},
         {"translation\":", "scale\":      ", "matrix, rotation or scale"},
         {"\"POSITION\"", "\"POSITIOM\"", "POSITION is missing"},
         {"\"count\":20", "\"count\":21", "wanted 21"},

@@ -73,19 +73,20 @@ typedef struct tape_entry {
 typedef struct hit_tape {
     tape_entry *entries;
     size_t count, capacity;
-    float *T_left; /* [TILE_PACKETS][PACKET_LANES] T behind all hits; over lists with packet_order */
-    size_t T_left_capacity;
+    float *sums; /* over lists with packet_order, [2][TILE_PACKETS][PACKET_LANES]: T behind all hits; sum of T
+                    alpha u over them (trace_settings.spread) */
+    size_t sum_capacity;
 } hit_tape;
 
 static inline size_t hit_tape_bytes(const hit_tape *tape)
 {
-    return tape->count * sizeof *tape->entries + tape->T_left_capacity * sizeof *tape->T_left;
+    return tape->count * sizeof *tape->entries + tape->sum_capacity * sizeof *tape->sums;
 }
 
 static inline void hit_tape_free(hit_tape *tape)
 {
     mem_free(tape->entries);
-    mem_free(tape->T_left);
+    mem_free(tape->sums);
     *tape = (hit_tape){0};
 }
 

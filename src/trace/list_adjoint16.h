@@ -5,59 +5,13 @@
      every packet: its entries --> [replay_list] rows evaluated again, T in front of every hit
          --> [collect_behind] from the last row to the first: what lies behind every hit
          --> [sum_rows] h and T alpha of every row, summed over the rays in a fixed tree
-     sums of each Gaussian --> the slot of its pair
-         --> [turn_sums] added per record and turned into the Gaussian's own axes
+     sums of each Gaussian --> the slot of its pair --> [turn_sums] those of its record
 
-   With packet_order, sum_in_order() does the whole of a packet in one pass from the last row to the first.
-   Included by list_kernel.inc.h. */
+   With packet_order, sum_in_order() does the whole of a packet instead. Included by list_kernel.inc.h. */
 #ifndef GBT_TRACE_LIST_ADJOINT16_H
 #define GBT_TRACE_LIST_ADJOINT16_H
 
-#include "trace/list_rows16.h"
-
-enum { AHEAD = 12 /* how many records ahead are prefetched */ };
-
-/* The Gaussians that a tile has blended. */
-typedef struct used_list {
-    tile_gaussian *gaussian; /* [count] */
-    uint32_t *number;        /* [list] place in `gaussian`; UINT32_MAX: not used */
-    size_t count;
-} used_list;
-
-static bool load_used(const list_view *view, size_t part, const double middle[2], const hit_tape *tape,
-                      list_scratch *scratch, used_list *out)
-{
-    const size_t begin = view->first[part], count = view->first[part + 1] - begin;
-    if (mem_reserve((void **)&scratch->list, &scratch->list_capacity, 0, 18 * count + 1, sizeof(float),
-                    "list of a tile", NULL) != GBT_OK ||
-        mem_reserve((void **)&scratch->sums, &scratch->sum_capacity, 0, count, sizeof *scratch->sums,
-                    "sums of a tile", NULL) != GBT_OK)
-        return false;
-    out->gaussian = (tile_gaussian *)(void *)scratch->list;
-    out->number = (uint32_t *)(void *)(scratch->list + 16 * count);
-    uint32_t *pair = out->number + count;
-    /* Mark first, then number: numbering at once, each entry would wait for the counter that the one before
-       stored. */
-    memset(out->number, 0xFF, count * sizeof *out->number);
-    for (size_t i = 0; i < tape->count; i++)
-        out->number[tape->entries[i].id] = 0;
-    size_t used = 0;
-    for (size_t i = 0; i < count; i++) {
-        const bool is_used = out->number[i] == 0;
-        pair[used] = (uint32_t)i;
-        out->number[i] = is_used ? (uint32_t)used : UINT32_MAX;
-        used += is_used;
-    }
-    out->count = used;
-    const list_pair *pairs = view->pairs + begin;
-    memset(scratch->sums, 0, out->count * sizeof *scratch->sums);
-    for (size_t i = 0; i < out->count; i++) {
-        if (i + AHEAD < out->count)
-            __builtin_prefetch(&view->records[pairs[pair[i + AHEAD]].record]);
-        read_gaussian(&view->records[pairs[pair[i]].record], middle, pair[i], &out->gaussian[i]);
-    }
-    return true;
-}
+#include "trace/list_one_order16.h"
 
 /* insert_row() when the tape says how far row i steps back, so that no branch depends on what it meets. Where
    row i has a hit in front of one of row j, last_passed[j] becomes i: collect_behind() has to go on from row
@@ -221,44 +175,6 @@ static inline void row_gradients(const packet_hits *rows, int i, vfloat16 alpha_
     *weight = vfloat16_mul(row_load(rows->T_front, i), alpha);
 }
 
-/* Adds the terms of a row, summed over the rays, to the sums of its Gaussian. Lanes eight apart are added
-   while they are multiplied (vfloat16_fold_product). */
-static inline void add_sums(vfloat16 h, vfloat16 weight, const vfloat16 v[3], const vfloat16 d_rgb[3],
-                            float *to)
-{
-    vfloat8 terms[16];
-    vfloat16 hv[3];
-    terms[SLOT_H] = vfloat16_fold(h);
-    for (int k = 0; k < 3; k++) {
-        hv[k] = vfloat16_mul(h, v[k]);
-        terms[SLOT_HV + k] = vfloat16_fold(hv[k]);
-        terms[SLOT_HVV + k] = vfloat16_fold_product(hv[k], v[k]);
-        terms[SLOT_COLOR + k] = vfloat16_fold_product(weight, d_rgb[k]);
-    }
-    terms[SLOT_HVV + 3] = vfloat16_fold_product(hv[1], v[2]);
-    terms[SLOT_HVV + 4] = vfloat16_fold_product(hv[2], v[0]);
-    terms[SLOT_HVV + 5] = vfloat16_fold_product(hv[0], v[1]);
-    terms[SLOT_WEIGHT] = vfloat16_fold(weight);
-    terms[14] = terms[15] = vfloat16_fold(vfloat16_set1(0));
-    vfloat16_store(to, vfloat16_add(vfloat16_load(to), vfloat8_sum_rows(terms)));
-}
-
-/* add_sums() for a row that view_form16.h does not hold for: v comes from the general form. */
-static void sum_general(const kernel_scene *scene, const packet_rays *rays, uint32_t id, vmask16 hit,
-                        vfloat16 h, vfloat16 weight, const vfloat16 d_rgb[3], float *to)
-{
-    const gaussian_lanes g = broadcast_gaussian(scene->records + (size_t)id * RECORD_FLOATS);
-    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near), zero = vfloat16_set1(0);
-    ray_lanes ray;
-    vfloat16 v[3];
-    load_rays(rays, &ray);
-    response r = respond(&g, &ray, t_near);
-    refine_point(&g, &ray, t_near, &r);
-    for (int k = 0; k < 3; k++) /* v may be more than a float holds where the ray did not hit */
-        v[k] = vfloat16_select(hit, r.v[k], zero);
-    add_sums(h, weight, v, d_rgb, to);
-}
-
 /* Adds the sums of all rows. v = R / den (-y, w1 w2, w1 w3) (view_form16.h); the factor R and the sign of the
    first component are left to turn_sums(), which applies them once per record. */
 static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfloat16 direction[3],
@@ -304,58 +220,6 @@ static PASS void sum_rows(const packet_pass *p, const used_list *used, const vfl
     }
 }
 
-/* The whole adjoint of a packet with one order, from the last row to the first. `T` starts as that behind all
-   rows and is divided by 1 - alpha from row to row; `behind` is g . B, B the colour behind the row, and
-   starts as that of the background. */
-static PASS void sum_in_order(const packet_pass *p, const used_list *used, const tape_entry *entry,
-                              size_t count, vfloat16 T, vfloat16 behind, const vfloat16 direction[3],
-                              gradient_slot *sums)
-{
-    const kernel_scene *scene = p->scene;
-    const packet_rays *rays = p->rays;
-    const tile_gaussian *used_gaussian = used->gaussian;
-    const uint32_t *used_number = used->number;
-    const vfloat16 one = vfloat16_set1(1), zero = vfloat16_set1(0), a = vfloat16_load(p->slopes.a),
-                   b = vfloat16_load(p->slopes.b), length = vfloat16_load(p->slopes.length),
-                   alpha_max = vfloat16_set1(scene->settings.alpha_max),
-                   d_rgb[3] = {direction[0], direction[1], direction[2]};
-    for (size_t done = 0; done < count; done += TOGETHER) {
-        const size_t left = count - done;
-        const tile_gaussian *g[TOGETHER];
-        row_response r[TOGETHER];
-        vfloat16 alpha[TOGETHER], one_minus_alpha[TOGETHER], inverse[TOGETHER], h[TOGETHER], weight[TOGETHER],
-            v[TOGETHER][3];
-        uint32_t number[TOGETHER];
-        for (size_t k = 0; k < TOGETHER; k++) {
-            number[k] = used_number[entry[k < left ? left - 1 - k : 0].id];
-            g[k] = &used_gaussian[number[k]];
-        }
-        respond_rows(scene, rays, g, a, b, length, r, v);
-        for (size_t k = 0; k < TOGETHER; k++) {
-            const vmask16 hit = vmask16_from_bits(entry[k < left ? left - 1 - k : 0].lanes);
-            alpha[k] = vfloat16_select(hit, vfloat16_min(r[k].raw, alpha_max), zero);
-            one_minus_alpha[k] = vfloat16_sub(one, alpha[k]);
-            inverse[k] = vfloat16_div(one, one_minus_alpha[k]);
-        }
-        for (size_t k = 0; k < TOGETHER; k++) { /* the cap: see row_gradients() */
-            const vfloat16 color = dot_lanes(g[k]->color, d_rgb);
-            T = vfloat16_mul(T, inverse[k]);
-            weight[k] = vfloat16_mul(T, alpha[k]);
-            const vfloat16 d_log = vfloat16_mul(weight[k], vfloat16_sub(color, behind));
-            h[k] = vfloat16_select(vfloat16_lt(alpha[k], alpha_max),
-                                   vfloat16_mul(vfloat16_set1(-0.5f), d_log), zero);
-            behind = vfloat16_fma(one_minus_alpha[k], behind, vfloat16_mul(alpha[k], color));
-        }
-        for (size_t k = 0; k < TOGETHER && k < left; k++) {
-            float *to = sums[number[k]].sum;
-            if (g[k]->pair & PAIR_GENERAL)
-                sum_general(scene, rays, g[k]->id, vfloat16_lt(zero, alpha[k]), h[k], weight[k], d_rgb, to);
-            else
-                add_sums(h[k], weight[k], v[k], d_rgb, to);
-        }
-    }
-}
-
 static bool adjoint_of_packet(const packet_pass *p, const used_list *used, const hit_tape *tape, size_t from,
                               size_t count, float d_rgb_in[3][PACKET_LANES], packet_hits *rows,
                               list_scratch *scratch)
@@ -367,8 +231,10 @@ static bool adjoint_of_packet(const packet_pass *p, const used_list *used, const
     }
     const tape_entry *entry = tape->entries + from;
     if (p->scene->settings.packet_order) {
-        sum_in_order(p, used, entry, count, vfloat16_load(tape->T_left + p->number * PACKET_LANES),
-                     dot16(behind_all, d_rgb), d_rgb, scratch->sums);
+        const float *sums = tape->sums + p->number * PACKET_LANES;
+        sum_in_order(p, used, entry, count, vfloat16_load(sums),
+                     vfloat16_load(sums + TILE_PACKETS * PACKET_LANES), dot16(behind_all, d_rgb), d_rgb,
+                     scratch->sums);
         return true;
     }
     replay_list(p, used, entry, count, rows);
@@ -415,72 +281,6 @@ static bool backward_list(const kernel_scene *scene, list_view *view, size_t par
             view->slots[slot] = scratch->sums[used.number[i]];
     }
     return true;
-}
-
-/* The sums of records first .. first + 15 over their slots, in their order. */
-static inline void gather_slots(const list_view *view, size_t first, size_t end, float sum[16][16])
-{
-    for (size_t i = 0; i < 16; i++) {
-        vfloat16 total = vfloat16_set1(0);
-        const size_t at = first + i;
-        const uint32_t slots = at < end ? view->slot_count[at] : 0;
-        for (uint32_t k = 0; k < slots; k++) {
-            const uint32_t slot = view->slot_first[at] + k;
-            if (view->slot_used[slot])
-                total = vfloat16_add(total, vfloat16_load(view->slots[slot].sum));
-        }
-        vfloat16_store(sum[i], total);
-    }
-}
-
-/* Sums of the records [begin, end) over their slots, turned from the axes of view_form16.h into the
-   Gaussians' own. */
-static void turn_sums(const kernel_scene *scene, const list_view *view, const list_face *face, size_t begin,
-                      size_t end, block_sums *out)
-{
-    for (size_t first = begin; first < end; first += 16) {
-        _Alignas(64) float by_record[16][16];
-        _Alignas(64) float slope[3][16];
-        const size_t at = first - begin;
-        unsigned general = 0;
-        const float *rows[16];
-        uint32_t id[16];
-        vfloat16 sum[16], to[GRADIENT_OPACITY];
-        view_form form;
-        gather_slots(view, first, end, by_record);
-        for (size_t i = 0; i < 16; i++) {
-            const list_record *r = &view->records[first + i < end ? first + i : first];
-            rows[i] = by_record[i];
-            id[i] = record_id(r);
-            general |= (unsigned)record_is_general(r) << i;
-            slope[0][i] = (float)r->a;
-            slope[1][i] = (float)r->b;
-            slope[2][i] = r->depth;
-        }
-        const gaussian_lanes g = load_gaussians(scene, id, NULL);
-        view_form_find(face->frame.axis, &g, vfloat16_load(slope[0]), vfloat16_load(slope[1]),
-                       vfloat16_load(slope[2]), &form);
-        vfloat16_load_transposed(rows, sum);
-        const vfloat16 zero = vfloat16_set1(0), R = form.distance, RR = vfloat16_mul(R, R);
-        vfloat16 hv[3], hvv[6];
-        for (int k = 0; k < 3; k++)
-            hv[k] = vfloat16_mul(R, sum[SLOT_HV + k]);
-        for (int k = 0; k < 6; k++)
-            hvv[k] = vfloat16_mul(RR, sum[SLOT_HVV + k]);
-        hv[0] = vfloat16_sub(zero, hv[0]);
-        hvv[4] = vfloat16_sub(zero, hvv[4]);
-        hvv[5] = vfloat16_sub(zero, hvv[5]);
-        turn_moments(form.e, hv, hvv, to);
-        for (int k = 0; k < 9; k++) /* V, VV: those of general records are in their own axes already, in the
-                                       same order */
-            vfloat16_store(out->sum[k] + at,
-                           vfloat16_select(vmask16_from_bits(general), sum[SLOT_HV + k], to[k]));
-        vfloat16_store(out->sum[GRADIENT_OPACITY] + at,
-                       vfloat16_div(vfloat16_mul(vfloat16_set1(-2), sum[SLOT_H]), g.opacity));
-        for (int k = 0; k < 3; k++)
-            vfloat16_store(out->sum[GRADIENT_COLOR + k] + at, sum[SLOT_COLOR + k]);
-        vfloat16_store(out->sum[GRADIENT_WEIGHT] + at, sum[SLOT_WEIGHT]);
-    }
 }
 
 #endif

@@ -138,10 +138,12 @@ static PASS bool blend_list(const packet_pass *p, const tile_list *list, const p
     const vfloat16 infinite = vfloat16_set1(INFINITY), zero = vfloat16_set1(0), one = vfloat16_set1(1),
                    stop_at = vfloat16_set1(scene->settings.transmittance_min);
     const vfloat16 start = p->parts ? vfloat16_load(rays->T_front) : one;
-    const bool one_order = scene->settings.packet_order;
+    const bool one_order = scene->settings.packet_order,
+               spreads = one_order && tape != NULL && scene->settings.spread > 0;
+    const vfloat16 t_near = vfloat16_set1(scene->settings.t_near);
     const uint16_t packet = (uint16_t)p->number;
     vfloat16 product = one /* of 1 - alpha over the rows so far */, lowest = start,
-             rgb[3] = {zero, zero, zero};
+             rgb[3] = {zero, zero, zero}, near_sum = zero;
     const packet_hits copy = *from, *rows = &copy;
     uint64_t hits = 0, blended = 0;
     size_t entry_count = tape != NULL ? tape->count : 0;
@@ -166,6 +168,8 @@ static PASS bool blend_list(const packet_pass *p, const tile_list *list, const p
         lowest = vfloat16_min(lowest, vfloat16_select(blend, next, infinite));
         for (int c = 0; c < 3; c++)
             rgb[c] = vfloat16_fma(weight, vfloat16_set1(g->color[c]), rgb[c]);
+        if (spreads)
+            near_sum = vfloat16_fma(weight, nearness(row_load(rows->t, row), t_near), near_sum);
         if (scene->extra)
             note_row(&extra, rays, scene->records + (size_t)g->id * RECORD_FLOATS, g->id, blend, weight, next,
                      row_load(rows->t, row));
@@ -181,8 +185,10 @@ static PASS bool blend_list(const packet_pass *p, const tile_list *list, const p
         write_steps_back(from, tape->entries, tape->count, entry_count);
         tape->count = entry_count;
     }
-    if (tape != NULL && one_order)
-        vfloat16_store(tape->T_left + packet * PACKET_LANES, lowest);
+    if (tape != NULL && one_order) {
+        vfloat16_store(tape->sums + packet * PACKET_LANES, lowest);
+        vfloat16_store(tape->sums + (TILE_PACKETS + packet) * PACKET_LANES, near_sum);
+    }
     counters->hits += hits;
     counters->blended += blended;
     counters->rows += rows->count;
@@ -209,8 +215,8 @@ static bool forward_list(const kernel_scene *scene, const list_view *view, size_
         !reserve_rows_of_list(scratch, list.count, false, &rows))
         return false;
     if (tape != NULL && scene->settings.packet_order &&
-        mem_reserve((void **)&tape->T_left, &tape->T_left_capacity, 0, TILE_PACKETS * PACKET_LANES,
-                    sizeof *tape->T_left, "hit tape", NULL) != GBT_OK)
+        mem_reserve((void **)&tape->sums, &tape->sum_capacity, 0, 2 * TILE_PACKETS * PACKET_LANES,
+                    sizeof *tape->sums, "hit tape", NULL) != GBT_OK)
         return false;
     counters->candidates += (uint64_t)list.count;
     for (int i = 0; i < TILE_PACKETS; i++) {

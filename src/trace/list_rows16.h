@@ -200,6 +200,12 @@ static void order_copies(const kernel_scene *scene, const tile_list *list, packe
     }
 }
 
+/* u of trace_settings.spread: how near a hit is, 1 at the near depth and 0 far away. */
+static inline vfloat16 nearness(vfloat16 t, vfloat16 t_near)
+{
+    return vfloat16_div(t_near, vfloat16_max(t, t_near));
+}
+
 enum { MIDDLE = PACKET_PIXELS + 1 };
 
 /* The depth of a row by which it is sorted with packet_order: that on the middle ray, kept between half and

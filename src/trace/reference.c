@@ -338,13 +338,28 @@ static void respond_backward(const reference_scene *scene, const prepared *p, co
     d[REFERENCE_quat_z * n] += q[0] * a2 + q[1] * a1 - q[2] * a0;
 }
 
+/* dL/d(T alpha) of hit i by trace_settings.spread. */
+static double spread_gradient(const trace_settings *s, const reference_hit *hits, size_t count, size_t i,
+                              double T)
+{
+    const double t_near = (double)s->t_near, u = t_near / fmax(hits[i].t, t_near);
+    double sum = 0;
+    for (size_t j = 0; j < count; j++) {
+        const double weight = T * hits[j].alpha, between = t_near / fmax(hits[j].t, t_near) - u;
+        sum += weight * (j < i ? between : -between);
+        T *= 1 - hits[j].alpha;
+    }
+    return 2 * (double)s->spread * sum;
+}
+
 /* Back to front: `behind` is the colour and `T_behind` the transmittance of everything behind a hit, so
    nothing is divided by 1 - alpha. */
 static void ray_backward(const reference_scene *scene, const prepared *all, const trace_settings *s,
                          const reference_ray *ray, const hit_list *list, const double d_rgb[3],
                          double d_transmittance, double *d_gaussians)
 {
-    double rgb[3], T_left, behind[3], T_behind = 1;
+    double rgb[3], T_left, behind[3], T_behind = 1, spread_behind = 0;
+    const bool spreads = s->packet_order && s->spread > 0;
     const size_t blended = blend(scene, s, list->hits, list->count, ray->dir, ray->T_front, rgb, &T_left);
     sky_color_exact(&s->sky, s->background, ray->dir, behind);
     for (size_t i = blended; i-- > 0;) {
@@ -358,6 +373,11 @@ static void ray_backward(const reference_scene *scene, const prepared *all, cons
             d_gaussians[(REFERENCE_red + c) * scene->count + hit->id] += T * hit->alpha * d_rgb[c];
             d_alpha += T * (colour - behind[c]) * d_rgb[c];
             behind[c] = hit->alpha * colour + (1 - hit->alpha) * behind[c];
+        }
+        if (spreads) { /* like a further colour */
+            const double spread = spread_gradient(s, list->hits, blended, i, ray->T_front);
+            d_alpha += T * (spread - spread_behind);
+            spread_behind = hit->alpha * spread + (1 - hit->alpha) * spread_behind;
         }
         T_behind *= 1 - hit->alpha;
         respond_backward(scene, &all[hit->id], s, ray, hit->id, d_alpha, d_gaussians);

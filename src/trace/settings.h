@@ -21,6 +21,10 @@ typedef struct trace_settings {
                           middle, kept between half and twice that on the next ray that is hit. Hits behind
                           those that have made a ray opaque may be left out. Only rays that go over lists heed
                           it. Default false */
+    float spread; /* with packet_order, the adjoint adds the gradient of spread * sum over rays and over pairs
+                     of their hits, i blended before j, of 2 w_i w_j (u_i - u_j), where w = T alpha and u =
+                     t_near / max(t, t_near) is a constant: hits of a ray move together, or vanish (Barron
+                     2022). Default 0 */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

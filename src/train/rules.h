@@ -50,6 +50,8 @@ typedef struct train_rules {
     double splats_until;   /* progress until which splats are rendered instead of rays */
     bool loose_rays;       /* SCHEDULE_ALPHA_MIN, SCHEDULE_T_MIN and one order for each packet of rays until
                               SCHEDULE_EXACT_FROM */
+    double spread;         /* weight in the loss of how far apart the hits of a ray are, with loose rays:
+                              trace_settings.spread times the number of rays */
     bool leaves_out;       /* a random share of the anchors is left out of each step: schedule_left_out() */
     double raises_until;   /* progress until which the opacities of an offset are raised when their mean is
                               below 0 */

@@ -170,6 +170,7 @@ static trace_settings settings_of(const trainer *t, const step_view *v, double p
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
         settings.packet_order = true;
+        settings.spread = (float)(t->rules.spread / ((double)v->camera.width * v->camera.height));
     }
     return settings;
 }

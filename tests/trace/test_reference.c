@@ -654,6 +654,86 @@ static void cameras_that_cannot_make_rays(void **state)
     }
 }
 
+/* ---- the spread term ---- */
+
+enum { SPREAD_RAYS = 64 };
+
+typedef struct spread_job {
+    const trace_settings *s;
+    double of_ray[SPREAD_RAYS];
+} spread_job;
+
+static void spread_of_ray(void *context, size_t ray, const reference_hit *hits, size_t count)
+{
+    spread_job *job = context;
+    const double t_near = (double)job->s->t_near;
+    double T = 1, sum = 0;
+    for (size_t i = 0; i < count; T *= 1 - hits[i].alpha, i++) {
+        double T_j = T * (1 - hits[i].alpha);
+        for (size_t j = i + 1; j < count; T_j *= 1 - hits[j].alpha, j++)
+            sum += 2 * T * hits[i].alpha * T_j * hits[j].alpha *
+                   (t_near / fmax(hits[i].t, t_near) - t_near / fmax(hits[j].t, t_near));
+    }
+    job->of_ray[ray] = (double)job->s->spread * sum;
+}
+
+static double spread_of_all(const reference_scene *scene, const trace_settings *s, const ray_image *rays)
+{
+    spread_job job = {.s = s};
+    double sum = 0;
+    assert_ok(reference_scene_visit(scene, s, rays, NULL, spread_of_ray, &job, NULL));
+    for (int i = 0; i < SPREAD_RAYS; i++)
+        sum += job.of_ray[i];
+    return sum;
+}
+
+/* With opacities, which change weights and no depth, its gradient is that of what it is defined as. */
+static void spread_agrees_with_differences(void **state)
+{
+    (void)state;
+    enum { COUNT = 12 };
+    trace_settings s = trace_settings_default();
+    s.packet_order = true;
+    s.spread = 0.7f;
+    s.t_near = 2;
+    s.alpha_min = 1e-6f;
+    gaussians g = some(COUNT, 0.4f);
+    for (int i = 0; i < COUNT; i++) {
+        g.mean_x[i] = 0.1f * (float)(i % 3 - 1);
+        g.mean_z[i] = 3 + 0.5f * (float)((i * 5) % COUNT);
+        g.opacity[i] = 0.1f + 0.05f * (float)i;
+    }
+    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                               .width = 8,
+                               .height = 8,
+                               .params = {8, 8, 4, 4},
+                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    ray_image rays = {0};
+    assert_ok(ray_image_from_camera(&camera, &rays, NULL));
+    assert_int_equal(ray_image_count(&rays), SPREAD_RAYS);
+    reference_scene scene;
+    assert_ok(reference_scene_make(&g, &scene, NULL));
+    double *d = mem_calloc(COUNT, GAUSSIANS_FIELD_COUNT * sizeof *d, "test", NULL),
+           *none = mem_calloc(SPREAD_RAYS, 3 * sizeof *none, "test", NULL);
+    assert_ok(reference_scene_backward(&scene, &s, &rays, none, NULL, d, NULL));
+    for (size_t i = 0; i < COUNT; i++) {
+        const double h = 1e-6, got = d[REFERENCE_opacity * COUNT + i];
+        double *opacity = &scene.fields[REFERENCE_opacity * COUNT + i], side[2];
+        for (int k = 0; k < 2; k++) {
+            *opacity += (k == 0 ? 1 : -2) * h;
+            side[k] = spread_of_all(&scene, &s, &rays);
+        }
+        *opacity += h;
+        assert_true(fabs(got) > 1e-3);
+        assert_near(got, (side[0] - side[1]) / (2 * h), 1e-7 * fabs(got) + 1e-8);
+    }
+    mem_free(none);
+    mem_free(d);
+    reference_scene_free(&scene);
+    ray_image_free(&rays);
+    gaussians_free(&g);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -670,6 +750,7 @@ int main(void)
         cmocka_unit_test(stops_before_transmittance_min),
         cmocka_unit_test(broken_gaussians_are_not_seen),
         cmocka_unit_test(gradients_agree_with_differences),
+        cmocka_unit_test(spread_agrees_with_differences),
         cmocka_unit_test(float_entries_and_threads),
         cmocka_unit_test(memory_runs_out),
         cmocka_unit_test(rays_of_every_model),

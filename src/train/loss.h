@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/loss.h -- the training loss: the image terms (L1, DSSIM) and the volume term of the Gaussians, with
-   weights and gradients (Yang 2026, eq 35). All code that needs the loss of a run uses this file. */
+   weights and gradients (Yang 2026, eq 35). All code that needs the loss of a run uses this file. Of the last
+   term, how far apart the hits of a ray are, there is only a gradient: the rays' adjoint adds it
+   (trace_settings.spread). */
 #ifndef GBT_TRAIN_LOSS_H
 #define GBT_TRAIN_LOSS_H
 

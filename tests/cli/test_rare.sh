@@ -157,7 +157,7 @@ report $? "wide photos of a result folder that were divided before" "$(cat err o
 sed -i "s/source_path='[^']*'/source_path=''/" result/cfg_args && "$program" render result -o listed --format exr >out 2>err && "$program" compare whole/*0.exr listed/*0.exr >>out 2>>err
 report $? "the cameras in a result folder have sizes of their own" "$(cat err out)"
 mkdir -p close/images && cp made/images/0000.png made/images/0001.png close/images && frame() { printf '{"file_path": "images/%s.png", "transform_matrix": [[0,0,1,%s],[1,0,0,0],[0,1,0,%s],[0,0,0,1]]}' "$1" "$2" "$3"; }
-printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 1 0)" "$(frame 0001 -0.8 0.3)" >close/transforms.json
+printf '{"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": 32, "h": 24, "frames": [%s, %s]}' "$(frame 0000 1 0)" "$(frame 0001 -0.2 0.3)" >close/transforms.json
 "$program" train made -o facing --near 0.9 --iterations 40 --eval-split every=3 --quiet >out 2>&1
 "$program" export facing n.ply n.glb n.sog n.usda n.spz n.splat near/ --data close --refine 0 >out 2>err && "$program" render facing -o near-model --data close >>err 2>&1
 for file in n.ply n.glb n.sog n.usda n.spz n.splat near; do

@@ -23,8 +23,8 @@ typedef struct trace_settings {
                           it. Default false */
     float spread; /* with packet_order, the adjoint adds the gradient of spread * sum over rays and over pairs
                      of their hits, i blended before j, of 2 w_i w_j (u_i - u_j), where w = T alpha and u =
-                     t_near / max(t, t_near) is a constant: hits of a ray move together, or vanish (Barron
-                     2022). Default 0 */
+                     t_near / max(t, t_near) is a constant: opacities change so that a ray's weight gathers at
+                     one depth (Barron 2022, eq 15). Default 0 */
 } trace_settings;
 
 static inline trace_settings trace_settings_default(void)

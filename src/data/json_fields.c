@@ -10,6 +10,9 @@
 #include "base/file.h"
 #include "base/memory.h"
 
+/* Of memory in jansson, at most: an empty object in a list takes 80, texts as short as {} somewhat more. */
+enum { BYTES_PER_CHARACTER = 100 };
+
 static gbt_status parse(const char *text, size_t length, const char *name, json_type type, json_t **out,
                         gbt_error *err)
 {
@@ -18,9 +21,9 @@ static gbt_status parse(const char *text, size_t length, const char *name, json_
     *out = NULL;
     if (length == mark)
         return base_fail(err, GBT_ERR_FORMAT, "%s:1: file is empty (wanted JSON)", name);
+    /* Without memory jansson would report a wrong token, nothing at all, or end the program. */
+    GBT_TRY(mem_check(length + 16, BYTES_PER_CHARACTER, name, err));
     *out = json_loadb(text + mark, length - mark, JSON_REJECT_DUPLICATES, &where);
-    if (*out == NULL && json_error_code(&where) == json_error_out_of_memory)
-        return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory for the JSON", name);
     if (*out == NULL)
         return base_fail(err, GBT_ERR_FORMAT, "%s:%d: not usable JSON: %s", name, where.line, where.text);
     if (json_typeof(*out) == type)

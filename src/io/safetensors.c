@@ -5,6 +5,8 @@
 #include <jansson.h>
 #include <math.h>
 
+#include "data/json_fields.h"
+
 enum { LENGTH_BYTES = 8, HEADER_LIMIT = 100 << 20 };
 
 static gbt_status read_header(const source_file *file, json_t **root, size_t *data_at, gbt_error *err)
@@ -16,12 +18,7 @@ static gbt_status read_header(const source_file *file, json_t **root, size_t *da
         return base_fail(err, GBT_ERR_FORMAT,
                          "%s: not a .safetensors file (its header would have %llu bytes, but %zu follow)",
                          file->name, (unsigned long long)length, cursor_left(&c));
-    json_error_t fault;
-    *root =
-        json_loadb((const char *)file->bytes + LENGTH_BYTES, (size_t)length, JSON_REJECT_DUPLICATES, &fault);
-    if (*root == NULL)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: not a .safetensors file: header: %s", file->name,
-                         fault.text);
+    GBT_TRY(json_read_text((const char *)file->bytes + LENGTH_BYTES, (size_t)length, file->name, root, err));
     *data_at = LENGTH_BYTES + (size_t)length;
     return GBT_OK;
 }

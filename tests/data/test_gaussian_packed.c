@@ -499,6 +499,32 @@ static void sog_meta_that_is_wrong(void **state)
     }
 }
 
+static void memory_runs_out(void **state)
+{
+    (void)state;
+    static const char *const names[] = {"m.sog", "m.glb"};
+    const double origin[3] = {0, 0, 0};
+    gaussian_cloud a;
+    make_cloud(&a, 20, 0);
+    for (int i = 0; i < 2; i++) {
+        gbt_status status = GBT_ERR_NO_MEMORY;
+        long k = 0;
+        assert_ok(gaussian_file_write(in_folder(names[i]), &a, origin, &assert_ok_err_));
+        for (; status != GBT_OK && k < 1000; k++) {
+            gaussian_cloud b;
+            gbt_error err = {0};
+            mem_fail_after(k);
+            status = gaussian_file_read(in_folder(names[i]), &b, &err);
+            mem_fail_after(-1);
+            if (status != GBT_OK && (status != GBT_ERR_NO_MEMORY || err.text[0] == '\0'))
+                fail_msg("%s, allocation %ld: %d %s", names[i], k, (int)status, err.text);
+            gaussian_cloud_free(&b);
+        }
+        assert_true(status == GBT_OK && k > 3);
+    }
+    gaussian_cloud_free(&a);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -518,6 +544,7 @@ int main(void)
         cmocka_unit_test(levels_follow_the_values),
         cmocka_unit_test(palette_entries_are_means),
         cmocka_unit_test(sog_meta_that_is_wrong),
+        cmocka_unit_test_setup_teardown(memory_runs_out, folder_make, folder_remove),
         cmocka_unit_test(older_compressed_ply),
         cmocka_unit_test(far_ones_are_apart),
     };

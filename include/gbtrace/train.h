@@ -217,10 +217,10 @@ gbt_status gbt_set_memory(size_t bytes, const char *folder, gbt_error *err);
 size_t gbt_peak_memory(void);
 
 /**
- * Set a handler at the start of a program: `end` is called, on any thread, when an allocation fails inside a
- * library that cannot recover (OpenImageIO, oneTBB, jansson). It must end the process. Without a handler such
- * a failure becomes GBT_ERR_NO_MEMORY if the library allows it; otherwise the process ends with SIGABRT or
- * waits forever, and valid JSON may be rejected or JSON be written with fields missing.
+ * Set a handler at the start of a program: `end` is called, on any thread, when an allocation or the start of
+ * a thread fails inside a library that cannot recover (OpenImageIO, oneTBB, jansson). It must end the
+ * process. Without a handler such a failure becomes GBT_ERR_NO_MEMORY if the library allows it; otherwise the
+ * process ends with SIGABRT or waits forever, or JSON is written with fields missing.
  */
 void gbt_when_out_of_memory(void (*end)(void));
 

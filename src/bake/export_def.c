@@ -10,6 +10,7 @@
 #include "base/fail.h"
 #include "base/file.h"
 #include "data/gaussian_file.h"
+#include "data/result_folder.h"
 
 gbt_export_def gbt_export_def_default(void)
 {
@@ -27,6 +28,18 @@ static gbt_status check_place(const char *path, const char *folder, gbt_error *e
     return file_check_creatable(path, err);
 }
 
+/* The file that an input is read from when it is a folder: a run's model, or the Gaussians of a result. */
+static gbt_status find_source(const char *input, char out[RESULT_PATH_SIZE], gbt_error *err)
+{
+    result_folder result;
+    bool found;
+    GBT_TRY(result_folder_find(input, &result, &found, err));
+    if (!found)
+        return file_join(out, RESULT_PATH_SIZE, input, "model.gbt", err);
+    memcpy(out, result.ply, sizeof result.ply);
+    return GBT_OK;
+}
+
 static gbt_status check_places(const char *input, const char *json, const char *const *outputs,
                                size_t output_count, gbt_error *err)
 {
@@ -38,11 +51,11 @@ static gbt_status check_places(const char *input, const char *json, const char *
                 return base_fail(err, GBT_ERR_ARGUMENT,
                                  "%s: would be written twice (each output must be another file)", other);
         }
-    char trained[4096];
-    GBT_TRY(file_join(trained, sizeof trained, input, "model.gbt", err));
+    char source[RESULT_PATH_SIZE];
+    GBT_TRY(find_source(input, source, err));
     for (size_t i = 0; i <= output_count; i++) {
         const char *out = i < output_count ? outputs[i] : json;
-        if (out != NULL && !file_is_folder(out) && (file_is_same(out, input) || file_is_same(out, trained)))
+        if (out != NULL && !file_is_folder(out) && (file_is_same(out, input) || file_is_same(out, source)))
             return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (%s must be another file)", out,
                              i < output_count ? "the output" : "`json`");
     }

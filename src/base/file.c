@@ -255,7 +255,21 @@ size_t file_mark_bytes(const void *text, size_t count)
     return count >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
 }
 
-bool file_is_one(const char *a, const char *b) { return strcmp(a, b) == 0 || file_is_same(a, b); }
+bool file_is_one(const char *a, const char *b)
+{
+    const char *const paths[2] = {a, b}, *name[2];
+    char folder[2][4096];
+    if (strcmp(a, b) == 0 || file_is_same(a, b))
+        return true;
+    for (int i = 0; i < 2; i++) {
+        const char *slash = strrchr(paths[i], '/');
+        name[i] = slash != NULL ? slash + 1 : paths[i];
+        if (snprintf(folder[i], sizeof folder[i], "%.*s./", (int)(name[i] - paths[i]), paths[i]) >=
+            (int)sizeof folder[i])
+            return false;
+    }
+    return strcmp(name[0], name[1]) == 0 && file_is_same(folder[0], folder[1]);
+}
 
 bool file_ends_with(const char *path, const char *ending)
 {

@@ -96,7 +96,7 @@ bool file_is_same(const char *a, const char *b);
 /** Size of a UTF-8 byte order mark at the start of a text of `count` bytes: 3 or 0. */
 size_t file_mark_bytes(const void *text, size_t count);
 
-/** Whether both name the same file: equal paths, or the same existing file. */
+/** Whether both name the same file: equal paths, the same existing file, or the same name in one folder. */
 bool file_is_one(const char *a, const char *b);
 
 /** The largest N of the entries PREFIX<N> in a folder, with N in decimal digits; false when there is none. */

@@ -12,6 +12,7 @@
 
 #include "base/cpu.h"
 #include "base/fail.h"
+#include "base/parallel.h"
 #include "bvh/embree_api.h"
 
 static pthread_once_t made_once = PTHREAD_ONCE_INIT;
@@ -62,6 +63,7 @@ static const char *configuration(void)
 static void make_device(void)
 {
     snprintf(version, sizeof version, "%s", RTC_VERSION_STRING);
+    parallel_threads(); /* finds how many can start, before Embree's tasks run on them */
     device = rtcNewDevice(configuration());
     if (device == NULL) {
         creation_error = rtcGetDeviceError(NULL);

@@ -98,7 +98,7 @@ static int dispatch(int argc, char **argv)
 static void end_without_memory(void)
 {
     const int code = gbt_status_exit_code(GBT_ERR_NO_MEMORY);
-    progress_error("out of memory in a library");
+    progress_error("out of memory or threads in a library");
     progress_end(code);
     _exit(code);
 }

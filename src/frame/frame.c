@@ -75,6 +75,23 @@ static bool is_plain_view(const ray_shot *shot)
     return shot->given == NULL && shot->aperture_radius <= 0 && raster_takes(&shot->camera);
 }
 
+/* How much wider than on the edge of the picture a splat beyond it may be drawn: its width grows with the
+   slope k of its centre as sqrt(1 + k^2), up to the limits of the projection. 1 for rays. */
+static float splats_wider(const frame *f, const gbt_camera *camera)
+{
+    double low[2], high[2], wider = 1;
+    if (f->draw.renderer != GBT_RENDERER_RASTER)
+        return 1;
+    raster_limits(camera, low, high);
+    for (int k = 0; k < 2; k++)
+        for (int end = 0; end < 2; end++) {
+            const double limit = end == 0 ? low[k] : high[k], other = end == 0 ? high[k] : low[k],
+                         edge = limit + 0.15 / 1.3 * (other - limit);
+            wider = fmax(wider, (1 + limit * limit) / (1 + edge * edge));
+        }
+    return (float)sqrt(wider);
+}
+
 /* All stages up to building the tree, and f->rays through the middle of the aperture. `tracer` is
    optional. */
 static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
@@ -104,7 +121,7 @@ static gbt_status prepare(frame *f, frame_subject subject, const ray_shot *shot,
     f->widened = f->draw.footprint > 0 && shot->given == NULL; /* given rays have no known width */
     /* sigmas: where the response of an opaque Gaussian falls to alpha_min */
     const visible_reach extent = {
-        .sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)),
+        .sigmas = 1.001f * sqrtf(2 * logf(1 / settings->alpha_min)) * splats_wider(f, &shot->camera),
         .width = sqrtf(f->widened ? pixel_variance(f, f->draw.footprint) : dilation_of(f)),
         .pixel = (float)f->view.pixel,
         .parallel = f->view.kind == FOOTPRINT_PARALLEL,
@@ -191,6 +208,22 @@ gbt_status frame_render(frame *f, frame_subject subject, const gbt_camera *camer
     return GBT_OK;
 }
 
+static gbt_status trace_sample(frame *f, const ray_shot *shot, int sample, const frame_tracer *tracer,
+                               gbt_error *err)
+{
+    stage_clock clock = stage_begin();
+    if (shot->given == NULL && shot->aperture_radius > 0)
+        GBT_TRY(ray_image_from_shot(shot, sample, &f->rays, err));
+    stage_add(&f->times.rays, stage_lap(&clock));
+    if (tracer != NULL)
+        GBT_TRY(tracer->trace(tracer->context, &f->scene, &f->rays, &f->rgb, err));
+    else
+        GBT_TRY(
+            trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters, err));
+    stage_add(&f->times.trace, stage_lap(&clock));
+    return GBT_OK;
+}
+
 /* Trace all samples and add them, in order, in double. */
 static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_tracer *tracer, double *sum,
                                 gbt_error *err)
@@ -198,16 +231,7 @@ static gbt_status trace_samples(frame *f, const ray_shot *shot, const frame_trac
     const size_t values = 3 * ray_image_count(&f->rays);
     const int samples = ray_shot_sample_count(shot);
     for (int s = 0; s < samples; s++) {
-        stage_clock clock = stage_begin();
-        if (shot->given == NULL && shot->aperture_radius > 0)
-            GBT_TRY(ray_image_from_shot(shot, s, &f->rays, err));
-        stage_add(&f->times.rays, stage_lap(&clock));
-        if (tracer != NULL)
-            GBT_TRY(tracer->trace(tracer->context, &f->scene, &f->rays, &f->rgb, err));
-        else
-            GBT_TRY(trace_forward(&f->scene, &f->rays, false, &(trace_outputs){.rgb = &f->rgb}, &f->counters,
-                                  err));
-        stage_add(&f->times.trace, stage_lap(&clock));
+        GBT_TRY(trace_sample(f, shot, s, tracer, err));
         for (size_t i = 0; i < values; i++)
             sum[i] += (double)f->rgb.pixels[i];
     }
@@ -230,6 +254,8 @@ gbt_status frame_render_with(frame *f, frame_subject subject, const ray_shot *sh
     }
     GBT_TRY(prepare(f, subject, shot, settings, tracer, err));
     f->times.trace = (stage_time){0};
+    if (ray_shot_sample_count(shot) == 1)
+        return trace_sample(f, shot, 0, tracer, err);
     double *sum = mem_calloc(ray_image_count(&f->rays), 3 * sizeof *sum, "picture", err);
     const gbt_status status = sum == NULL ? GBT_ERR_NO_MEMORY : trace_samples(f, shot, tracer, sum, err);
     mem_free(sum);

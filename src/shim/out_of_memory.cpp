@@ -3,14 +3,15 @@
 
    This happens at the failed allocation itself, not where an exception would be caught. OpenImageIO throws
    while it holds locks, so another thread would wait for them forever. oneTBB throws without calling the new
-   handler, on threads of its own where nobody catches. jansson would report that a text is not JSON, and
-   would write a file without the fields for which it had no memory. */
+   handler, on threads of its own where nobody catches. jansson would write a file without the fields for
+   which it had no memory. */
 #include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <new>
 
 #include <jansson.h>
+#include <tbb/task_group.h>
 #include <unistd.h>
 
 extern "C" {
@@ -33,12 +34,21 @@ static void end_once()
         pause(); /* another thread is already ending the process */
 }
 
+extern "C" void library_out_of_memory(void)
+{
+    if (end_process == nullptr)
+        std::abort();
+    end_once();
+}
+
 static void end_by_exception()
 {
     try {
         if (const std::exception_ptr why = std::current_exception())
             std::rethrow_exception(why);
     } catch (const std::bad_alloc &) {
+        end_once();
+    } catch (const tbb::missing_wait &) { /* Embree's tasks were left when oneTBB could not start a thread */
         end_once();
     } catch (...) {
     }

@@ -7,6 +7,8 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <thread>
+#include <vector>
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -17,6 +19,8 @@
 #include <tbb/version.h>
 
 extern "C" {
+#include "base/library_end.h"
+#include "base/log.h"
 #include "base/machine.h"
 }
 
@@ -25,12 +29,36 @@ static std::unique_ptr<tbb::global_control> limit;
 static std::unique_ptr<tbb::task_arena> wide;
 static int thread_count = 0;
 
+/* How many of `threads` threads, this one among them, can exist at once. oneTBB throws when it cannot start
+   one, at any time later, with tasks still running. */
+static int threads_that_start(int threads)
+{
+    std::mutex end;
+    std::vector<std::thread> started;
+    {
+        const std::lock_guard<std::mutex> not_yet(end);
+        try {
+            started.reserve(static_cast<size_t>(threads));
+            while (static_cast<int>(started.size()) + 1 < threads)
+                started.emplace_back([&end] { const std::lock_guard<std::mutex> now(end); });
+        } catch (const std::exception &) {
+        }
+    }
+    for (std::thread &thread : started)
+        thread.join();
+    return static_cast<int>(started.size()) + 1;
+}
+
 extern "C" void parallel_set_threads(int threads)
 try {
     if (threads < 1)
         threads = 1;
     if (threads > PARALLEL_THREADS_MAX)
         threads = PARALLEL_THREADS_MAX;
+    const int wanted = threads;
+    threads = threads_that_start(wanted);
+    if (threads < wanted)
+        log_warn("only %d of %d threads could be started", threads, wanted);
     wide.reset();
     limit.reset();
     limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
@@ -118,9 +146,9 @@ try {
     else
         run_all();
 } catch (...) {
-    /* The bodies are C and cannot throw, so only an allocation of TBB itself can fail;
-       gbt_when_out_of_memory() handles that. */
-    std::terminate();
+    /* The bodies are C and cannot throw: TBB itself had no memory, or could not start a thread. Blocks may
+       still be running. */
+    library_out_of_memory();
 }
 
 extern "C" const char *parallel_library(void)

@@ -578,6 +578,10 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "--no-backdrop: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --no-backdrop
     misuse 2 "--data: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --data made
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply o.ply
+    misuse 2 "./o.ply: would be written twice (each output must be another file)" export plain.ply ./o.ply o.ply
+    mkdir -p result/point_cloud/iteration_7 && cp plain.ply result/point_cloud/iteration_7/point_cloud.ply
+    misuse 2 "result/point_cloud/iteration_7/point_cloud.ply: would be overwritten (the output must be another file)" \
+        export result result/point_cloud/iteration_7/point_cloud.ply
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply --json o.ply
     misuse 2 "plain.ply: would be overwritten (--json must be another file)" export plain.ply o.ply --json plain.ply
     misuse 2 "./plain.ply: would be overwritten (the output must be another file)" export plain.ply o.ply ./plain.ply

@@ -9,7 +9,7 @@ set -u
 here=$(cd "$(dirname "$0")" && pwd)
 names="$(sed -n 's/^try \([a-z-]*\) .*/\1/p' "$here/faults.sh" | tr '\n' ' ')outside"
 [ -z "${4:-}" ] || [[ " $names " = *" $4 "* ]] || { echo "error: $4: no such command (wanted one of: $names)" >&2; exit 2; }
-program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-} calls=${5:-open write fsync close rename mkdir find look read memory library}
+program=$(realpath "$1") shim=$(realpath "$2") step=$3 only=${4:-} calls=${5:-open write fsync close rename mkdir find look read thread memory library}
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -106,9 +106,10 @@ try() { # name, goes on (yes or no), command...
         faulty "$call:0:count" "$@"
         [ $code = 0 ] || { bad "$name" "exit code $code without a fault"; return; }
         total=$(cat count)
-        [ "$total" -gt 0 ] || [ "$call" = mkdir ] || [ "$name" = view ] || bad "$name" "no $call was counted: the shim does not work"
+        [ "$total" -gt 0 ] || [[ " mkdir thread " = *" $call "* ]] || [ "$name" = view ] || bad "$name" "no $call was counted: the shim does not work"
         each=$step
         case $call in
+        thread) each=1 ;;
         memory | library) each=$((total / (step < 60 ? 200 / step : 3) + 1)) ;; # there are thousands
         esac
         for ((n = 1; n <= total; n += each)); do
@@ -119,7 +120,7 @@ try() { # name, goes on (yes or no), command...
             # Every file that these write is wanted: no failure may go unnoticed.
             [[ " export render compress report make-scene " != *" $name "* || " open write fsync close rename " != *" $call "* ]] ||
                 [ "$code" != 0 ] || bad "$name, $call $n of $total fails" "a success"
-            [[ " memory library find look read " == *" $call "* ]] && continue
+            [[ " thread memory library find look read " == *" $call "* ]] && continue
             prepare
             faulty "$call:$n:kill" "$@"
             look "$name, killed at $call $n of $total" kill

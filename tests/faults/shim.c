@@ -2,17 +2,18 @@
 /* tests/faults/shim.c -- loaded before a program's libraries (LD_PRELOAD): makes one of its system calls
    fail, or ends the process there.
 
-   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, find, look, read, memory,
-   library; from 1) does WHAT: fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case the number
-   of such calls is written to the file GBT_FAULT_COUNT when the process ends by itself.
+   GBT_FAULT=CALL:N:WHAT: the N-th CALL (open, write, fsync, close, rename, mkdir, find, look, read, thread,
+   memory, library; from 1) does WHAT: fail, or kill. GBT_FAULT=CALL:0:count: nothing happens. In each case
+   the number of such calls is written to the file GBT_FAULT_COUNT when the process ends by itself.
    GBT_FAULT=short:0:all: every read and write is interrupted once, then moves some bytes only.
    GBT_FAULT=clock:0:back: the time of day goes back by an hour at each look. Calls count when they make,
-   write or rename files; find is open() to read, look is stat(); read counts for regular files; memory is
-   aligned_alloc(), which is all that the program's own code takes; library is malloc() and its like, which
-   libraries take. */
+   write or rename files; find is open() to read, look is stat(); read counts for regular files; thread is
+   pthread_create(); memory is aligned_alloc(), which is all that the program's own code takes; library is
+   malloc() and its like, which libraries take. */
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
@@ -218,6 +219,14 @@ int mkdir(const char *path, mode_t mode)
     if (real == NULL)
         *(void **)&real = next("mkdir");
     return fails("mkdir", EACCES) ? -1 : real(path, mode);
+}
+
+int pthread_create(pthread_t *out, const pthread_attr_t *attributes, void *(*run)(void *), void *argument)
+{
+    static int (*real)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+    if (real == NULL)
+        *(void **)&real = next("pthread_create");
+    return fails("thread", EAGAIN) ? EAGAIN : real(out, attributes, run, argument);
 }
 
 void *aligned_alloc(size_t align, size_t size)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* tests/frame/test_splats.c -- splats that stand for rays: of the same footprint, so of the same picture and
-   gradient where nothing overlaps; without one they are dilated, which small Gaussians show. */
+   gradient where nothing overlaps; without one they are dilated, which small Gaussians show. Splats whose
+   centres are outside of the picture. */
 #include "anchor/fixture.h"
 #include "base/near.h"
 #include "frame/frame.h"
@@ -100,10 +101,48 @@ static void splats_of_a_footprint_are_rays(void **state)
     gaussian_cloud_free(&cloud);
 }
 
+/* A splat whose centre is outside of the picture is drawn as wide as there, which is wider than at the edge:
+   one whose ball does not reach the view's planes may be seen. */
+static void splats_beyond_the_edge(void **state)
+{
+    (void)state;
+    enum { SIDE = 1024 };
+    static const float away[4][2] = {{24.5f, 0}, {-24.5f, 0}, {0, 24.5f}, {0, -24.5f}};
+    const double focal = SIDE / 2 / tan(1.0471975512); /* 120 degrees */
+    const gbt_camera camera = {.model = GBT_CAMERA_PINHOLE,
+                               .params = {focal, focal, SIDE / 2, SIDE / 2},
+                               .width = SIDE,
+                               .height = SIDE,
+                               .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    const trace_settings settings = trace_settings_default();
+    gaussian_cloud cloud;
+    assert_ok(gaussian_cloud_alloc(&cloud, 1, NULL));
+    cloud.sh_degree = 0;
+    memset(cloud.scale_log, 0, 3 * sizeof *cloud.scale_log);
+    cloud.quat[0] = 1;
+    cloud.quat[1] = cloud.quat[2] = cloud.quat[3] = 0;
+    cloud.opacity[0] = 0.99f;
+    memset(cloud.sh, 0, 48 * sizeof *cloud.sh); /* grey */
+    for (int i = 0; i < 4; i++) {
+        frame f = {.draw.renderer = GBT_RENDERER_RASTER};
+        float lightest = 0;
+        for (int k = 0; k < 2; k++)
+            cloud.mean[k] = away[i][k];
+        cloud.mean[2] = 10;
+        assert_ok(frame_render(&f, frame_plain(&cloud), &camera, &settings, false, NULL));
+        for (size_t k = 0; k < 3 * SIDE * SIDE; k++)
+            lightest = fmaxf(lightest, f.rgb.pixels[k]);
+        assert_true(lightest > 0.005f);
+        frame_free(&f);
+    }
+    gaussian_cloud_free(&cloud);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(splats_of_a_footprint_are_rays),
+        cmocka_unit_test(splats_beyond_the_edge),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

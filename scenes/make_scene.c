@@ -341,6 +341,24 @@ static gbt_status check_other_cameras(const gbt_make_scene_def *def, const char 
                            path);
 }
 
+/* A data set of others has files of the same names. */
+static gbt_status check_foreign(const char *folder, gbt_error *err)
+{
+    static const char *const names[] = {"images", "sparse", "transforms.json"};
+    char path[PATH_SIZE];
+    GBT_TRY(file_join(path, sizeof path, folder, "SCENE.md", err));
+    if (file_exists(path))
+        return GBT_OK;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        GBT_TRY(file_join(path, sizeof path, folder, names[i], err));
+        if (file_exists(path))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "%s: exists, but not from a scene that was made here (wanted another folder)",
+                             path);
+    }
+    return GBT_OK;
+}
+
 gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt_error *err)
 {
     PLAIN_NUMBERS;
@@ -351,6 +369,7 @@ gbt_status gbt_make_scene(const gbt_make_scene_def *def, const char *folder, gbt
     GBT_TRY(def_check(def->cookie_, "gbt_make_scene_def_default", err));
     GBT_TRY(find_recipe(def->name, &r, err));
     GBT_TRY(check_def(def, err));
+    GBT_TRY(check_foreign(folder, err));
     GBT_TRY(check_other_cameras(def, folder, err));
     /* Before any work: an unwritable folder should fail at once. */
     GBT_TRY(make_folder(folder, "images", err));

@@ -56,8 +56,9 @@ const char *gbt_make_scene_summary(const char *name);
  * made; written first) and, with def->depth, depth/NNNN.exr: one float channel, the distance along the ray
  * through the pixel's centre from the camera centre to the first surface, scene units (not z), 0 where
  * nothing is hit; with def->gaussians, gaussians.ply: plain Gaussians of degree 3, 248 bytes each, spread
- * evenly over the surfaces, with the colours seen from the front. Existing files of these names are replaced,
- * others stay. Rolling shutters are refused when the folder has a sub-folder sparse.
+ * evenly over the surfaces, with the colours seen from the front. Those of an earlier scene are replaced,
+ * others stay. Refused: a folder with images, sparse or transforms.json, but no SCENE.md; rolling shutters in
+ * a folder with a sub-folder sparse.
  *
  * Every sparse point is a surface point that at least three views see, moved by Gaussian noise; its
  * observations are the projections of the unmoved point with 0.3 px of noise. One point in a hundred is an

@@ -194,7 +194,8 @@ typedef struct gbt_gaussians_gradient {
 /**
  * Adjoint of the last gbt_model_render(), which must have had `keep`: from dL/d(rgb) to the pose of its
  * camera and to plain Gaussians. It can be called once for each such render, before any change of the
- * settings or the Gaussians; a call with unusable arguments does not count.
+ * settings or the Gaussians; a call with unusable arguments does not count, unless the gradient itself
+ * exceeds the range of float.
  *
  * The pose is differentiated by the motion (v, omega) of gbt_camera_moved() at 0: v moves the camera along
  * its own axes (right, down, forward), omega turns it about them, radians. Let W be the rotation from world

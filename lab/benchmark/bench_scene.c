@@ -21,11 +21,11 @@ gbt_status bench_scene_open(const char *path, const char *camera, bench_scene *o
     if (camera == NULL && is_plain)
         return base_fail(err, GBT_ERR_ARGUMENT,
                          "%.300s: plain Gaussians have no cameras (wanted --camera FILE.json)", path);
+    GBT_TRY(loaded_run_open_model(path, run, err));
     if (camera != NULL) {
-        GBT_TRY(loaded_run_open_model(path, run, err));
         GBT_TRY(camera_file_read(camera, run->model.origin, &out->camera, err));
     } else {
-        GBT_TRY(loaded_run_open(path, NULL, 0, run, err));
+        GBT_TRY(loaded_run_open_own_views(path, run, err));
         size_t view = 0;
         while (view + 1 < run->scene.view_count && !run->scene.views[view].is_test)
             view++;

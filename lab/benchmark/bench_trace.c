@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/file.h"
 #include "base/parallel.h"
 #include "benchmark/bench_passes.h"
 #include "benchmark/bench_reference.h"
@@ -237,6 +238,10 @@ gbt_status lab_bench_trace(const lab_bench_def *def, FILE *out, gbt_error *err)
 {
     if (def->model == NULL || def->repeats < 1 || def->repeats > 1000)
         return base_fail(err, GBT_ERR_ARGUMENT, "bench: wanted a model and 1 to 1000 repeats");
+    if (def->json != NULL && (file_is_same(def->json, def->model) ||
+                              (def->camera != NULL && file_is_same(def->json, def->camera))))
+        return base_fail(err, GBT_ERR_ARGUMENT, "%s: would be overwritten (`json` must be another file)",
+                         def->json);
     bench_scene traced = {0};
     bench_reference want = {0};
     measured m = {.def = def, .scene = &traced};

@@ -28,7 +28,7 @@ gbt_status lab_check_grad(const char *run, FILE *out, gbt_error *err)
     if (status == GBT_OK)
         status = loaded_run_need_anchors(loaded, run, err);
     if (status == GBT_OK)
-        status = loaded_run_open_views(run, NULL, 0, loaded, err);
+        status = loaded_run_open_own_views(run, loaded, err);
     const gbt_renderer trained = loaded->frame.draw.renderer;
     loaded->frame.draw.renderer = GBT_RENDERER_TRACE;
     if (status == GBT_OK)

@@ -129,7 +129,7 @@ static gbt_status measure_model(const char *run, const char *path, rate_model *o
     if (status == GBT_OK)
         status = loaded_run_need_anchors(r, run, err);
     if (status == GBT_OK)
-        status = loaded_run_open_views(run, NULL, 0, r, err);
+        status = loaded_run_open_own_views(run, r, err);
     if (status == GBT_OK)
         status = model_save(path, &r->model, err);
     if (status == GBT_OK) {

@@ -182,7 +182,9 @@ static gbt_status measure(const char *run, study_figures *f, gbt_error *err)
     loaded_run *r = mem_calloc(1, sizeof *r, "run", err);
     if (r == NULL)
         return GBT_ERR_NO_MEMORY;
-    gbt_status status = loaded_run_open(run, NULL, 0, r, err);
+    gbt_status status = loaded_run_open_model(run, r, err);
+    if (status == GBT_OK)
+        status = loaded_run_open_own_views(run, r, err);
     if (status == GBT_OK)
         status = measure_views(r, f, err);
     f->macs_per_anchor = network_macs(&r->model.decoder);

@@ -81,8 +81,9 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
 static gbt_status scale_from_spacing(anchors *a, const anchor_init_def *def, gbt_error *err)
 {
     const double factor = (double)def->scale_factor, most = (double)def->scale_max,
-                 least = def->kind == GBT_INIT_VOXEL ? baseline_spacing_min
-                                                     : ANCHOR_SPACING_LEAST(def->balls.voxel_size);
+                 least = def->kind == GBT_INIT_VOXEL && def->balls.min_radius > 0
+                             ? baseline_spacing_min
+                             : ANCHOR_SPACING_LEAST(def->balls.voxel_size);
     if (a->count == 1) {
         set_scale(a, 0, first_scale((double)def->balls.voxel_size, least, factor, most));
         return GBT_OK;

@@ -30,7 +30,8 @@ anchor_init_def anchor_init_def_default(void);
  * Make the initial anchors: offsets and features are 0, log-scales follow the scale rule.
  *
  * GBT_SCALE_PRIOR_NN: root mean square distance to the 3 nearest anchors (or as many as there are), with
- * floor ANCHOR_SPACING_LEAST(), for voxels sqrt(1e-7); a single anchor uses the voxel size.
+ * floor ANCHOR_SPACING_LEAST(), for voxels with balls.min_radius > 0 sqrt(1e-7); a single anchor uses the
+ * voxel size.
  * GBT_SCALE_PRIOR_GB: eqs 29-34 with the nearest anchor, with floor balls_least_radius(); an anchor that is
  * alone or coincides with another uses its ball's radius as the spacing. Then all scales are multiplied by
  * scale_factor; scale_max takes precedence over floors and factor. No points give no anchors.
@@ -63,7 +64,7 @@ gbt_status anchor_scales_from_spacing(const float *position, size_t count, doubl
                                       double most, float *out, gbt_error *err);
 
 /** Floor of the spacing, which coincident points get. It is a fraction of the voxel size, so that it does not
-    depend on the unit of length; the baseline uses sqrt(1e-7) in the data's unit. */
+    depend on the unit of length; the baseline of the paper uses sqrt(1e-7) in the data's unit. */
 #define ANCHOR_SPACING_LEAST(voxel_size) ((double)(voxel_size) / 64)
 
 #endif

@@ -255,20 +255,27 @@ size_t file_mark_bytes(const void *text, size_t count)
     return count >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
 }
 
+static const char *name_in_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+bool file_is_in(const char *path, const char *folder)
+{
+    char own[4096];
+    const int length = (int)(name_in_folder(path) - path);
+    return snprintf(own, sizeof own, "%.*s./", length, path) < (int)sizeof own && file_is_same(own, folder);
+}
+
 bool file_is_one(const char *a, const char *b)
 {
-    const char *const paths[2] = {a, b}, *name[2];
-    char folder[2][4096];
-    if (strcmp(a, b) == 0 || file_is_same(a, b))
-        return true;
-    for (int i = 0; i < 2; i++) {
-        const char *slash = strrchr(paths[i], '/');
-        name[i] = slash != NULL ? slash + 1 : paths[i];
-        if (snprintf(folder[i], sizeof folder[i], "%.*s./", (int)(name[i] - paths[i]), paths[i]) >=
-            (int)sizeof folder[i])
-            return false;
-    }
-    return strcmp(name[0], name[1]) == 0 && file_is_same(folder[0], folder[1]);
+    char folder[4096];
+    const char *name = name_in_folder(a);
+    return strcmp(a, b) == 0 || file_is_same(a, b) ||
+           (strcmp(name, name_in_folder(b)) == 0 &&
+            snprintf(folder, sizeof folder, "%.*s./", (int)(name - a), a) < (int)sizeof folder &&
+            file_is_in(b, folder));
 }
 
 bool file_ends_with(const char *path, const char *ending)

@@ -96,6 +96,9 @@ bool file_is_same(const char *a, const char *b);
 /** Size of a UTF-8 byte order mark at the start of a text of `count` bytes: 3 or 0. */
 size_t file_mark_bytes(const void *text, size_t count);
 
+/** Whether `folder` exists, and is the folder in which a file of this path is or would be. */
+bool file_is_in(const char *path, const char *folder);
+
 /** Whether both name the same file: equal paths, the same existing file, or the same name in one folder. */
 bool file_is_one(const char *a, const char *b);
 

@@ -72,9 +72,11 @@ static gbt_status open_run(const char *run, const gbt_compress_def *def, loaded_
         return GBT_OK;
     *has_views = def->data != NULL || r->data.place[0] != '\0';
     if (!*has_views) {
-        log_info("%s is not there: quantization steps are estimated from the model alone, which makes the "
-                 "file larger (name the folder where the data set is now)",
-                 r->model.data_folder);
+        log_info(
+            "%s%s: quantization steps are estimated from the model alone, which makes the file larger (name "
+            "the folder where the data set is)",
+            r->model.data_folder[0] != '\0' ? r->model.data_folder : run,
+            r->model.data_folder[0] != '\0' ? " is not there" : " names no data set");
         return GBT_OK;
     }
     r->data_is_known = def->after_training;

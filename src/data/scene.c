@@ -237,12 +237,16 @@ static gbt_status load_folder(const char *path, raw_scene *raw, const char **sou
                      path);
 }
 
+gbt_status scene_need(const char *path, gbt_error *err)
+{
+    return file_exists(path) ? GBT_OK : base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
+}
+
 static gbt_status load_raw(const char *path, raw_scene *raw, const char **source, gbt_error *err)
 {
     file_kind kind;
     GBT_TRY(file_look(path, &kind, err));
-    if (kind == FILE_NONE)
-        return base_fail(err, GBT_ERR_IO, "%s: no such file or folder", path);
+    GBT_TRY(scene_need(path, err));
     return kind == FILE_OTHER ? load_file_source(path, raw, source, err)
                               : load_folder(path, raw, source, err);
 }
@@ -482,6 +486,6 @@ double scene_camera_extent(const scene *s)
             const double from_mean[3] = {c[0] - mean[0], c[1] - mean[1], c[2] - mean[2]};
             farthest = fmax(farthest, dvec_length(from_mean));
         }
-    return fmax(1.1 * farthest, 1e-3); /* not 0 for a single camera or position, or else the learning rate
-                                          would be 0 */
+    return farthest > 0 ? 1.1 * farthest : 1e-3; /* not 0 for a single camera or position, or else the
+                                                    learning rate would be 0 */
 }

@@ -87,6 +87,9 @@ typedef struct scene_split {
     list_path points into `text`. */
 gbt_status scene_split_parse(const char *text, scene_split *out, gbt_error *err);
 
+/** GBT_ERR_IO when there is nothing at the path of a data set. */
+gbt_status scene_need(const char *path, gbt_error *err);
+
 /**
  * Load a data set folder, a transforms.json or a .ply point cloud.
  *

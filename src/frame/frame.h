@@ -93,7 +93,8 @@ typedef struct frame {
  * An anchor or plain Gaussian is visible when a ball that encloses all its proxies intersects a region that
  * encloses all rays, so nothing that could be seen is left out. The region is bounded by planes along the
  * sides of the image for cameras that look forward, otherwise it is a cone around the mean direction, widened
- * by the spread of the ray origins. Networks and spherical harmonics are evaluated for the camera centre.
+ * by the spread of the ray origins. Networks and spherical harmonics are evaluated for the mean of the rays'
+ * origins.
  *
  * @param keep_tape [in] true if frame_backward_gaussians(), frame_backward_plain() or frame_blend_weights()
  *                       will follow

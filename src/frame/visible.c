@@ -241,9 +241,6 @@ static bool slopes_are_known(const ray_shot *shot, const ray_image *rays, double
     return aperture <= 0 || (camera_is_still(&shot->camera) && camera_lens_looks_forward(&rays->lens));
 }
 
-/* `rays` are those through the middle of the aperture. Another point of it shifts an origin by at most its
-   radius R, and with the focus at F a slope by at most R / F and a direction by at most asin(R / F). With
-   ray_shot.one_start the moving camera's true origins are at most half of its path away. */
 gbt_status view_bounds_find(const ray_shot *shot, const ray_image *rays, view_bounds *out, gbt_error *err)
 {
     bounds_job job = {.rays = rays};

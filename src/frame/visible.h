@@ -35,7 +35,8 @@ static inline view_bounds view_bounds_none(void)
  *
  * @param rays [in] those through the middle of the aperture. Another point of the aperture shifts an origin
  *                  by at most its radius R, and with the focus at F a slope by at most R / F and a direction
- *                  by at most asin(R / F)
+ *                  by at most asin(R / F). With ray_shot.one_start the true origins are at most half of the
+ *                  camera's path away
  * @return GBT_OK or GBT_ERR_NO_MEMORY
  * Threads: uses all; same bits for every thread count.
  */

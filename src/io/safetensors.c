@@ -94,7 +94,7 @@ gbt_status safetensors_read(const source_file *file, const char *name, tensor *o
 {
     *out = (tensor){0};
     json_t *root;
-    size_t data_at, at = 0;
+    size_t data_at = 0, at = 0;
     GBT_TRY(read_header(file, &root, &data_at, err));
     gbt_status status = read_entry(file, json_object_get(root, name), name, data_at, out, &at, err);
     json_decref(root);

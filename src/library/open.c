@@ -226,7 +226,7 @@ gbt_status gbt_model_set_settings(gbt_model *m, const gbt_model_settings *settin
                                   {"transmittance_min", &g->transmittance_min, 1, FLT_MIN, below_one}};
     for (size_t k = 0; k < sizeof ranges / sizeof *ranges; k++)
         if (!(*ranges[k].values >= ranges[k].low && *ranges[k].values <= ranges[k].high))
-            return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %g to %g)", ranges[k].name,
+            return base_fail(err, GBT_ERR_ARGUMENT, "settings: %s %g (wanted %.8g to %.8g)", ranges[k].name,
                              (double)*ranges[k].values, (double)ranges[k].low, (double)ranges[k].high);
     if (g->alpha_max < g->alpha_min)
         return base_fail(err, GBT_ERR_ARGUMENT, "settings: alpha_max %g (wanted alpha_min, %g, or more)",

@@ -45,6 +45,9 @@ static gbt_status read_queries(const gbt_query_def *def, query_rows *rows, gbt_e
         return base_fail(err, GBT_ERR_FORMAT,
                          "%.400s: 7 numbers for a ray (wanted 6, or 8 with t_min and t_max)",
                          def->at != NULL ? "at" : def->from);
+    if (round && rows->width == 3 && def->radius <= 0)
+        return base_fail(err, GBT_ERR_ARGUMENT,
+                         "radius: 0 (wanted more, or a fourth number for each query point)");
     return GBT_OK;
 }
 

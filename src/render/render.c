@@ -123,14 +123,19 @@ static gbt_status write_one(render_job *job, const ray_shot *shot, const char *o
     return render_outputs_write(r, shot, job->outputs, out, name, err);
 }
 
+static gbt_status check_size(const gbt_camera *c, const char *name, gbt_error *err)
+{
+    return (int64_t)c->width * c->height * 3 <= IMAGE_SAMPLES_MAX
+               ? GBT_OK
+               : base_fail(err, GBT_ERR_ARGUMENT,
+                           "%s: a picture of %d x %d pixels (wanted at most %lld pixels)", name, c->width,
+                           c->height, (long long)(IMAGE_SAMPLES_MAX / 3));
+}
+
 static gbt_status render_one(render_job *job, const ray_shot *shot, const char *out, const char *name,
                              const gbt_render_def *def, gbt_error *err)
 {
-    const gbt_camera *c = &shot->camera;
-    if ((int64_t)c->width * c->height * 3 > IMAGE_SAMPLES_MAX)
-        return base_fail(err, GBT_ERR_ARGUMENT,
-                         "%s: a picture of %d x %d pixels (wanted at most %lld pixels)", name, c->width,
-                         c->height, (long long)(IMAGE_SAMPLES_MAX / 3));
+    GBT_TRY(check_size(&shot->camera, name, err));
     GBT_TRY(draw(job, shot, def, err));
     if (!job->together)
         return write_one(job, shot, out, name, def, err);
@@ -270,6 +275,7 @@ static gbt_status make_film(render_job *job, const camera_path *path, const char
     video *film = NULL;
     image picture = {0};
     gbt_status status = GBT_OK;
+    GBT_TRY(check_size(camera, out, err)); /* all frames have one size */
     if (cluster_leads()) {
         status = video_open(out, camera->width, camera->height, path->fps, &film, err);
         if (status == GBT_OK)
@@ -437,6 +443,20 @@ static gbt_status check_scored(const loaded_run *r, const char *out, const gbt_r
                            out);
 }
 
+/* Pictures have the names of photos: in the folder of these they would replace them. */
+static gbt_status check_photos(const loaded_run *r, const char *out, gbt_error *err)
+{
+    for (size_t i = 0; i < r->scene.view_count; i++) {
+        const scene_view *view = &r->scene.views[i];
+        const char *path =
+            view->mask_path != NULL && file_is_in(view->mask_path, out) ? view->mask_path : view->path;
+        if (path != NULL && file_is_in(path, out))
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "%.1000s: holds photos or masks of the data set (wanted another folder)", out);
+    }
+    return GBT_OK;
+}
+
 gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *def, gbt_error *err)
 {
     PLAIN_NUMBERS;
@@ -450,6 +470,8 @@ gbt_status gbt_render(const char *run, const char *out, const gbt_render_def *de
         status = open_run(run, out, def, &job->run, err);
     if (status == GBT_OK)
         status = check_scored(&job->run, out, def, err);
+    if (status == GBT_OK)
+        status = check_photos(&job->run, out, err);
     if (status == GBT_OK)
         status = loaded_run_preset(def->preset, &job->run.settings, err);
     if (status == GBT_OK)

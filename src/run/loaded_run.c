@@ -241,6 +241,14 @@ gbt_status loaded_run_open_views(const char *run, const char *data, double downs
     return place_views(downscale, out, err);
 }
 
+gbt_status loaded_run_open_own_views(const char *run, loaded_run *out, gbt_error *err)
+{
+    const gbt_status status = loaded_run_open_views(run, NULL, 0, out, err);
+    if (status != GBT_OK && err != NULL)
+        loaded_run_cut_hint(err->text);
+    return status;
+}
+
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
                            gbt_error *err)
 {

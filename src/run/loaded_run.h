@@ -47,6 +47,10 @@ typedef struct loaded_run {
 gbt_status loaded_run_open(const char *run, const char *data, double downscale, loaded_run *out,
                            gbt_error *err);
 
+/** The second half of loaded_run_open() with the run's own data set, for callers that have no `data`, of
+   which errors then do not speak. */
+gbt_status loaded_run_open_own_views(const char *run, loaded_run *out, gbt_error *err);
+
 /** Remove the hint about `data` from an error text of loaded_run_open(), for programs that offer no such
     option. Returns whether there was one. */
 bool loaded_run_cut_hint(char *text);

@@ -392,7 +392,8 @@ gbt_status encode_png(const image *im, std::vector<unsigned char> *bytes, gbt_er
 
 gbt_status encode_exr(const image *im, std::vector<unsigned char> *bytes, gbt_error *err)
 {
-    const OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeFloat);
+    OIIO::ImageSpec spec(im->width, im->height, im->channels, OIIO::TypeFloat);
+    spec.attribute("DateTime", ""); /* else OpenImageIO writes the time: no two files would be equal */
     return encode("openexr", "image.exr", spec, im->pixels, bytes, err);
 }
 

@@ -85,11 +85,13 @@ gbt_status trace_build(trace_scene *scene, const gaussians *g, const trace_setti
 static kernel_scene scene_for_kernel(const trace_scene *scene)
 {
     const bool embree = scene->kernel == TRACE_EMBREE;
-    return (kernel_scene){.root = embree ? NULL : scene->tree.root,
-                          .embree = embree && scene->embree.box_count > 0 ? &scene->embree : NULL,
-                          .records = scene->records,
-                          .coordinate_max = fmaxf(scene->tree.coordinate_max, scene->reach),
-                          .settings = scene->settings};
+    return (kernel_scene){
+        .root = embree ? NULL : scene->tree.root,
+        .embree = embree && scene->embree.box_count > 0 ? &scene->embree : NULL,
+        .records = scene->records,
+        .coordinate_max =
+            fmaxf(embree ? scene->embree.coordinate_max : scene->tree.coordinate_max, scene->reach),
+        .settings = scene->settings};
 }
 
 /* ---- memory of the tiles in flight, passed from tile to tile ---- */

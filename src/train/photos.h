@@ -21,8 +21,8 @@ typedef struct photos {
     size_t decoded_max;     /* bytes for photos that are decoded at the same time; 0: a quarter of the free
                                memory */
     unsigned char **full;   /* [view_count] NULL until asked for */
-    unsigned char **full_valid; /* [view_count] mask of the same pixels: 0 where a value was not finite; NULL
-                                   for a photo whose values are all finite */
+    unsigned char **full_valid; /* [view_count] mask of the same pixels: 0 where masked, or where a value was
+                                   not finite; NULL for a photo without such pixels */
     unsigned char **transparency; /* [view_count] transparency of the same pixels, 255 is fully transparent;
                                      NULL for a photo that is opaque, or whose alpha channel is a mask */
     unsigned char *some_valid;    /* mask of the last photo that was served reduced or as every n-th pixel */
@@ -80,8 +80,8 @@ gbt_camera photos_camera(const photos *p, size_t view, int level);
  * A photo as float at a level of the pyramid. Levels above 0 are area means, computed in each call.
  *
  * @param out   [out] resized as needed (start from {0})
- * @param valid [out] optional: mask, 0 where a pixel covers a value that was not finite; NULL: all pixels are
- *                    valid. Borrowed until the next call.
+ * @param valid [out] optional: mask, 0 where a pixel covers one that is masked or not finite; NULL: all
+ * pixels are valid. Borrowed until the next call.
  */
 gbt_status photos_get(photos *p, size_t view, int level, image *out, const unsigned char **valid,
                       gbt_error *err);

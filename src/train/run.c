@@ -377,6 +377,8 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     run_paths paths;
     int lock = 0;
     gbt_status status = name_paths(run, &paths, err);
+    if (status == GBT_OK && cluster_leads() && !def->resume) /* before any folder is made */
+        status = scene_need(data, err);
     if (status == GBT_OK && cluster_leads())
         status = open_folder(run, def, &paths, err);
     const bool opened = status == GBT_OK && cluster_leads();

@@ -76,7 +76,7 @@ static bool find_scale(const seed_view *views, size_t count, double *distance)
         const double *at = cameras[i].center;
         sum += dvec_length((const double[3]){to[0] - at[0], to[1] - at[1], to[2] - at[2]});
     }
-    *distance = sum / (double)count > 1e-6 ? sum / (double)count : 1;
+    *distance = sum > 0 ? sum / (double)count : 1;
     return meet;
 }
 

@@ -71,7 +71,7 @@ struct trainer {
                                         schedule_left_out() */
     uint64_t round_step;             /* steps done at the last round of growth */
     uint64_t anchor_t;               /* Adam steps of the per-anchor groups */
-    uint64_t began;                  /* with rules.begins_at, steps done before the model began; 0: not yet */
+    uint64_t began;                  /* with rules.begins_at, the step at which the model began; 0: not yet */
     uint64_t skipped_steps, skipped_in_row;
     uint64_t empty_in_row, opacity_raises; /* steps in a row without a Gaussian although anchors were visible;
                                               number of times that opacities were raised for it */

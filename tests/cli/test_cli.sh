@@ -154,6 +154,8 @@ misuse 4 "nothing: no such file or folder" train -s nothing -m run -r 2 --eval -
 misuse 4 "nothing: no such file or folder" train --source_path nothing --model_path run --resolution 2 --n_offsets 10 --voxel_size 0.01
 misuse 2 "--output: given twice" train -s nothing -m run --output run
 misuse 4 "nothing: no such file or folder" train nothing -o run --budget 10min
+[ ! -e run ]
+report $? "no folder of a run whose data are missing"
 misuse 2 "-r: bad value (wanted a number from 0 to 64, got 800)" train -s nothing -m run -r 800
 misuse 2 "--budget: cannot be combined with --iterations" train nothing -o run --iterations 20 --budget 3s
 misuse 2 "--white_background: not supported; use --alpha white (the default of Blender's scenes)" train -s d -m r --white_background
@@ -422,6 +424,8 @@ misuse 2 'study: "pace" (wanted speed, crosscheck, rate, stability, paper, time 
 misuse 2 'study: "zzzzzz" (wanted speed, crosscheck, rate, stability, paper, time or anchors)' study zzzzzz gaussians.ply -o study
 misuse 2 'bench: "tarce" (wanted trace; did you mean trace?)' bench tarce --model gaussians.ply
 misuse 2 "bench trace: --model is missing (wanted --model FILE|RUN)" bench trace
+misuse 2 "./gaussians.ply: would be overwritten (--json must be another file)" $bench --json ./gaussians.ply
+misuse 2 "camera.json: would be overwritten (--json must be another file)" $bench --json camera.json
 misuse 2 "made/sparse: exists, and a COLMAP model cannot describe a rolling shutter (wanted another folder)" make-scene tabletop -o made --lens rolling
 misuse 2 "--seeds: does not apply to study speed (only to paper time anchors)" study speed gaussians.ply -o study --seeds 3
 misuse 2 "--count: does not apply to query within (only to nearest)" query within balls.txt --at 0,0,0 --radius 1 --count 3
@@ -432,6 +436,7 @@ prints "query, nearest" '^0,1,1,5,3,4,0,2$' query nearest balls.txt --at 0,0,0 -
 prints "query along a ray" '^0,0,1,4,3,4,0,2$' query crossed balls.txt --at 3,0,0,0,1,0
 prints "query of plain Gaussians" '^0,0,[0-9]*,' query nearest gaussians.ply --at=-1,0,0
 misuse 2 "--at, --from: neither is given (wanted exactly one of them)" query nearest balls.txt
+misuse 2 "--radius: 0 (wanted more, or a fourth number for each query point)" query within balls.txt --at 0,0,0
 misuse 3 "at:1: 2 numbers (wanted 3)" query nearest balls.txt --at 0,0
 misuse 4 "nowhere.txt: cannot open: No such file or directory" query nearest nowhere.txt --at 0,0,0
 misuse 2 'query: "near" (wanted nearest, within, containing, overlapping or crossed)' query near balls.txt --at 0,0,0
@@ -579,9 +584,9 @@ if "$program" train made -o run --iterations 3 --lossless >out 2>err; then
     misuse 2 "--data: does not apply to plain Gaussians, as in plain.ply (wanted a trained model)" export plain.ply o.ply --data made
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply o.ply
     misuse 2 "./o.ply: would be written twice (each output must be another file)" export plain.ply ./o.ply o.ply
-    mkdir -p result/point_cloud/iteration_7 && cp plain.ply result/point_cloud/iteration_7/point_cloud.ply
-    misuse 2 "result/point_cloud/iteration_7/point_cloud.ply: would be overwritten (the output must be another file)" \
-        export result result/point_cloud/iteration_7/point_cloud.ply
+    mkdir -p found/point_cloud/iteration_7 && cp plain.ply found/point_cloud/iteration_7/point_cloud.ply
+    misuse 2 "found/point_cloud/iteration_7/point_cloud.ply: would be overwritten (the output must be another file)" \
+        export found found/point_cloud/iteration_7/point_cloud.ply
     misuse 2 "o.ply: would be written twice (each output must be another file)" export plain.ply o.ply --json o.ply
     misuse 2 "plain.ply: would be overwritten (--json must be another file)" export plain.ply o.ply --json plain.ply
     misuse 2 "./plain.ply: would be overwritten (the output must be another file)" export plain.ply o.ply ./plain.ply

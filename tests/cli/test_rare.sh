@@ -80,7 +80,7 @@ report $? "an export tells scores to photos where these have no exposures" "$(ca
 
 mkdir -p mine/scene && holds "the demo leaves data that are no scene of its own alone" 2 '^error: mine/scene: exists, but is not a scene made by gbtrace ' demo -o mine && [ -z "$(ls mine/scene)" ]
 report $? "nor anything in their folder"
-mkdir -p shop/scene/sparse/0/images.bin && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
+mkdir -p shop/scene/sparse/0/images.bin && touch shop/scene/SCENE.md && "$program" make-scene tabletop -o shop/scene --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1
 [ $? = 4 ] && [ ! -e shop/scene/sparse/0/points3D.bin ] && rm -r shop/scene/sparse # bench/ looks for what is written last
 report $? "a scene that was not finished" "$(cat out; ls -R shop/scene)"
 mkdir -p rolled-part/points.ply && "$program" make-scene tabletop -o rolled-part --lens rolling --width 32 --height 24 --views 9 --samples 1 --points 60 >out 2>&1

@@ -430,6 +430,17 @@ static void noise_is_what_was_asked(void **state)
     free_written(&noisy);
 }
 
+static void data_of_others_stay(void **state)
+{
+    (void)state;
+    const gbt_make_scene_def def = small_def("tabletop");
+    gbt_error err = {0};
+    assert_ok(file_make_folder(in_folder("others/sparse"), NULL));
+    assert_int_equal(gbt_make_scene(&def, in_folder("others"), &err), GBT_ERR_ARGUMENT);
+    assert_non_null(strstr(err.text, "others/sparse: exists, but not from a scene that was made here"));
+    assert_false(file_exists(in_folder("others/SCENE.md")) || file_exists(in_folder("others/images")));
+}
+
 static void same_seed_same_bytes(void **state)
 {
     (void)state;
@@ -610,6 +621,7 @@ int main(void)
         cmocka_unit_test(rolling_cameras_are_true),
         cmocka_unit_test(noise_is_what_was_asked),
         cmocka_unit_test(same_seed_same_bytes),
+        cmocka_unit_test(data_of_others_stay),
         cmocka_unit_test(missing_arguments_are_refused),
         cmocka_unit_test(unwritable_folder_is_io),
         cmocka_unit_test(names_are_the_scenes),

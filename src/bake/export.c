@@ -245,8 +245,9 @@ static void say_source(const exporting *e, const gaussian_cloud *cloud, const ch
 {
     fprintf(report, "%s: %zu Gaussians, colours of degree %d", input, cloud->count, cloud->sh_degree);
     if (e->baked) {
-        fprintf(report, "; %s%zu that no training camera sees are left out",
-                e->backdrop ? "1000 of them the background; " : "", e->unseen);
+        if (e->backdrop)
+            fprintf(report, "; %d of them the background", (int)BACKDROP_COUNT);
+        fprintf(report, "; %zu that no training camera sees are left out", e->unseen);
         if (e->thinned > 0)
             fprintf(report, ", and %zu that are blended least", e->thinned);
         fprintf(report, "; baked in %.1f s, refined in %.1f s", e->bake_seconds, e->refine_seconds);

@@ -9,14 +9,18 @@
 #include "data/gaussian_formats.h"
 #include "data/spz_streams.h"
 
-enum { HEADER_BYTES = 16, EXTENSIONS_MAX = 1 << 20 };
+enum {
+    HEADER_BYTES = 16,
+    EXTENSIONS_MAX = 1 << 20,
+    ZIPPED_MAX = INT32_MAX /* bytes; zlib counts its input in 32 bits */
+};
 
 /* ---- writing ---- */
 
 static gbt_status zip_and_write(const char *path, const sink *plain, gbt_error *err)
 {
     z_stream z = {.next_in = plain->bytes, .avail_in = (uInt)plain->size};
-    if (plain->size > UINT32_MAX / 2)
+    if (plain->size > ZIPPED_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "%s: too many Gaussians for a .spz file", path);
     if (deflateInit2(&z, 9, Z_DEFLATED, 15 + 16 /* gzip, not zlib */, 8, Z_DEFAULT_STRATEGY) != Z_OK)
         return base_fail(err, GBT_ERR_NO_MEMORY, "%s: no memory", path);
@@ -144,8 +148,11 @@ static gbt_status spz_read(const source_file *file, gaussian_cloud *out, gbt_err
     memset(out, 0, sizeof *out);
     if (file->size >= 4 && memcmp(file->bytes, "NGSP", 4) == 0)
         return spz4_read(file, out, err);
-    if (file->size < 18 || file->bytes[0] != 0x1f || file->bytes[1] != 0x8b || file->size > UINT32_MAX / 2)
+    if (file->size < 18 || file->bytes[0] != 0x1f || file->bytes[1] != 0x8b)
         return base_fail(err, GBT_ERR_FORMAT, "%s: not an .spz file (wanted gzip data)", file->name);
+    if (file->size > ZIPPED_MAX)
+        return base_fail(err, GBT_ERR_FORMAT, "%s: gzipped .spz of %zu bytes (wanted less than 2 GiB)",
+                         file->name, file->size);
     unsigned char *copy = mem_alloc(file->size, 1, "splats", err); /* zlib's input pointer is not const */
     if (copy == NULL)
         return GBT_ERR_NO_MEMORY;

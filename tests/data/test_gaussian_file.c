@@ -415,6 +415,11 @@ static void refusals(void **state)
     const source_file five = {"v5.spz", (const unsigned char *)"NGSP\5\0\0\0xxxxxxxxxxxxxxxxxxxxxxxx", 32};
     assert_int_equal(gaussian_format_spz.read(&five, &cloud, &err), GBT_ERR_FORMAT);
     assert_non_null(strstr(err.text, "version 5"));
+    err = (gbt_error){0};
+    /* The size is checked before more than four bytes are read. */
+    const source_file large = {"large.spz", (const unsigned char *)"\x1f\x8b\b", (size_t)1 << 31};
+    assert_int_equal(gaussian_format_spz.read(&large, &cloud, &err), GBT_ERR_FORMAT);
+    assert_non_null(strstr(err.text, "2147483648 bytes (wanted less than 2 GiB)"));
     make_cloud(&cloud, 1, 0);
     err = (gbt_error){0};
     assert_int_equal(gaussian_file_write(in_folder("far.spz"), &cloud, (const double[3]){1e7, 0, 0}, &err),

@@ -40,15 +40,16 @@ static gbt_status wrong(const bundle *b, const char *what, gbt_error *err)
     return base_fail(err, GBT_ERR_FORMAT, "%s: meta.json: %s", b->file->name, what);
 }
 
-static gbt_status take_numbers(const bundle *b, const char *key, const char *field, size_t count, double *out,
-                               gbt_error *err)
+/* Read the list from number `first` on; what is before it stays as it is. */
+static gbt_status take_numbers(const bundle *b, const char *key, const char *field, size_t first,
+                               size_t count, double *out, gbt_error *err)
 {
     const json_t *list = json_object_get(json_object_get(b->meta, key), field);
     char what[80];
     snprintf(what, sizeof what, "%s.%s is no list of %zu numbers", key, field, count);
     if (json_array_size(list) != count)
         return wrong(b, what, err);
-    for (size_t k = 0; k < count; k++) {
+    for (size_t k = first; k < count; k++) {
         const json_t *value = json_array_get(list, k);
         if (!json_is_number(value))
             return wrong(b, what, err);
@@ -60,7 +61,12 @@ static gbt_status take_numbers(const bundle *b, const char *key, const char *fie
 static gbt_status take_levels(const bundle *b, const char *key, float *out, gbt_error *err)
 {
     double values[PALETTE_LEVELS];
-    GBT_TRY(take_numbers(b, key, "codebook", PALETTE_LEVELS, values, err));
+    const json_t *list = json_object_get(json_object_get(b->meta, key), "codebook");
+    /* PlayCanvas has written files whose first level is null, and reads them by this rule. */
+    const bool is_null = json_is_null(json_array_get(list, 0));
+    GBT_TRY(take_numbers(b, key, "codebook", is_null ? 1 : 0, PALETTE_LEVELS, values, err));
+    if (is_null)
+        values[0] = values[1] + (values[1] - values[PALETTE_LEVELS - 1]) / (PALETTE_LEVELS - 1);
     for (size_t k = 0; k < PALETTE_LEVELS; k++)
         out[k] = (float)values[k];
     return GBT_OK;
@@ -76,8 +82,8 @@ static gbt_status read_meta(bundle *b, gbt_error *err)
         return base_fail(err, GBT_ERR_FORMAT, "%s: %lld Gaussians cannot be in %zu bytes", b->file->name,
                          (long long)count, b->file->size);
     b->count = (size_t)count;
-    GBT_TRY(take_numbers(b, "means", "mins", 3, b->low, err));
-    GBT_TRY(take_numbers(b, "means", "maxs", 3, b->high, err));
+    GBT_TRY(take_numbers(b, "means", "mins", 0, 3, b->low, err));
+    GBT_TRY(take_numbers(b, "means", "maxs", 0, 3, b->high, err));
     GBT_TRY(take_levels(b, "scales", b->scales, err));
     GBT_TRY(take_levels(b, "sh0", b->colors, err));
     const json_t *rest = json_object_get(b->meta, "shN");

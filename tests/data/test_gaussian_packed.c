@@ -499,6 +499,75 @@ static void sog_meta_that_is_wrong(void **state)
     }
 }
 
+/* The bundle with level `level` of all three codebooks null, instead of a number. */
+static void put_null_level(const source_file *from, int level, sink *out)
+{
+    enum { FILES = 8 };
+    static const char *const names[FILES] = {"meta.json",          "means_l.webp",   "means_u.webp",
+                                             "scales.webp",        "quats.webp",     "sh0.webp",
+                                             "shN_centroids.webp", "shN_labels.webp"};
+    archive_member members[FILES];
+    unsigned char *bytes[FILES];
+    sink meta = {0};
+    for (int i = 0; i < FILES; i++) {
+        size_t size;
+        assert_ok(archive_take(from, names[i], &bytes[i], &size, &assert_ok_err_));
+        members[i] = (archive_member){names[i], bytes[i], size};
+    }
+    static const char word[] = "\"codebook\":[";
+    const char *at = (const char *)bytes[0];
+    for (const char *book; (book = strstr(at, word)) != NULL;) {
+        const char *number = book + sizeof word - 1;
+        for (int k = 0; k < level; k++)
+            number = strchr(number, ',') + 1;
+        sink_put(&meta, at, (size_t)(number - at));
+        sink_put_text(&meta, "null");
+        at = number + strcspn(number, ",]");
+    }
+    sink_put_text(&meta, at);
+    members[0] = (archive_member){"meta.json", meta.bytes, meta.size};
+    assert_ok(archive_put(out, "b.sog", members, FILES, 1, &assert_ok_err_));
+    sink_free(&meta);
+    for (int i = 0; i < FILES; i++)
+        mem_free(bytes[i]);
+}
+
+/* A first level that is null continues the others downwards; a later one is no number. */
+static void sog_without_a_first_level(void **state)
+{
+    (void)state;
+    gaussian_cloud a, b;
+    unsigned char *bytes;
+    source_file file = {.name = "a.sog"};
+    make_cloud(&a, 300, 1);
+    for (size_t i = 0; i < 3 * a.count; i++) /* the levels become k / 64 */
+        a.scale_log[i] = (float)(i % 256) / 64;
+    assert_ok(gaussian_file_write(in_folder("a.sog"), &a, nowhere, &assert_ok_err_));
+    assert_ok(gaussian_file_read(in_folder("a.sog"), &b, &assert_ok_err_));
+    gaussian_cloud_free(&a);
+    assert_ok(file_read(in_folder("a.sog"), &bytes, &file.size, &assert_ok_err_));
+    file.bytes = bytes;
+    for (int level = 0; level < 3; level++) {
+        sink s = {0};
+        gaussian_cloud c;
+        gbt_error err = {0};
+        put_null_level(&file, level, &s);
+        const source_file changed = {"b.sog", s.bytes, s.size};
+        assert_int_equal(gaussian_format_sog.read(&changed, &c, &err), level == 0 ? GBT_OK : GBT_ERR_FORMAT);
+        if (level > 0)
+            assert_non_null(strstr(err.text, "scales.codebook is no list of 256 numbers"));
+        for (size_t i = 0; level == 0 && i < 3 * b.count; i++) {
+            /* 1/64 + (1/64 - 255/64) / 255 */
+            const float want = b.scale_log[i] == 0 ? 0.0156250f - 254.0f / 64 / 255 : b.scale_log[i];
+            assert_true(fabsf(c.scale_log[i] - want) < 1e-6f);
+        }
+        gaussian_cloud_free(&c);
+        sink_free(&s);
+    }
+    mem_free(bytes);
+    gaussian_cloud_free(&b);
+}
+
 static void memory_runs_out(void **state)
 {
     (void)state;
@@ -544,6 +613,7 @@ int main(void)
         cmocka_unit_test(levels_follow_the_values),
         cmocka_unit_test(palette_entries_are_means),
         cmocka_unit_test(sog_meta_that_is_wrong),
+        cmocka_unit_test_setup_teardown(sog_without_a_first_level, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(memory_runs_out, folder_make, folder_remove),
         cmocka_unit_test(older_compressed_ply),
         cmocka_unit_test(far_ones_are_apart),

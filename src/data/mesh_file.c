@@ -51,19 +51,48 @@ static gbt_status add_corner(mesh_data *out, fan *f, uint32_t corner, raw_place 
 
 /* ---- OBJ ---- */
 
-static gbt_status take_vertex(mesh_data *out, const char *at, const char *end, raw_place place,
-                              gbt_error *err)
+typedef struct obj_text {
+    const char *at, *line_end; /* what is left of the line */
+    const char *next, *end;    /* the lines behind it */
+    bool continues;            /* the line ends in a backslash: the next one belongs to it */
+    raw_place place;
+} obj_text;
+
+static void take_line(obj_text *t)
+{
+    const char *newline = memchr(t->next, '\n', (size_t)(t->end - t->next));
+    t->at = t->next;
+    t->line_end = newline != NULL ? newline : t->end;
+    t->next = newline != NULL ? newline + 1 : t->end;
+    t->place.at++;
+    if (t->line_end > t->at && t->line_end[-1] == '\r')
+        t->line_end--;
+    t->continues = t->line_end > t->at && t->line_end[-1] == '\\';
+    t->line_end -= t->continues;
+}
+
+static bool next_word(obj_text *t, const char **word, size_t *length)
+{
+    while (!number_next_token(&t->at, t->line_end, word, length)) {
+        if (!t->continues || t->next >= t->end)
+            return false;
+        take_line(t);
+    }
+    return true;
+}
+
+static gbt_status take_vertex(mesh_data *out, obj_text *t, gbt_error *err)
 {
     const char *token;
     size_t length, count = 0;
     double position[3];
-    for (; count < 3 && number_next_token(&at, end, &token, &length); count++)
+    for (; count < 3 && next_word(t, &token, &length); count++)
         if (number_parse_double(token, length, &position[count]) != NUMBER_OK)
-            return raw_fail(err, place, "not a coordinate: %.*s",
+            return raw_fail(err, t->place, "not a coordinate: %.*s",
                             length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, token);
     if (count < 3)
-        return raw_fail(err, place, "vertex of %zu coordinates (wanted 3)", count);
-    return add_vertex(out, position, place, err);
+        return raw_fail(err, t->place, "vertex of %zu coordinates (wanted 3)", count);
+    return add_vertex(out, position, t->place, err);
 }
 
 /* A corner such as "7", "-1/2" or "3//4": the vertex number before the first slash, as an index from 0. */
@@ -85,17 +114,17 @@ static gbt_status parse_corner(const mesh_data *mesh, const char *token, size_t 
     return GBT_OK;
 }
 
-static gbt_status take_face(mesh_data *out, const char *at, const char *end, raw_place place, gbt_error *err)
+static gbt_status take_face(mesh_data *out, obj_text *t, gbt_error *err)
 {
     const char *token;
     size_t length;
     fan f = {0};
-    while (number_next_token(&at, end, &token, &length)) {
+    while (next_word(t, &token, &length)) {
         uint32_t corner = 0;
-        GBT_TRY(parse_corner(out, token, length, place, &corner, err));
-        GBT_TRY(add_corner(out, &f, corner, place, err));
+        GBT_TRY(parse_corner(out, token, length, t->place, &corner, err));
+        GBT_TRY(add_corner(out, &f, corner, t->place, err));
     }
-    return f.count >= 3 ? GBT_OK : raw_fail(err, place, "face of %zu corners (wanted 3 or more)", f.count);
+    return f.count >= 3 ? GBT_OK : raw_fail(err, t->place, "face of %zu corners (wanted 3 or more)", f.count);
 }
 
 static bool is_passed_over(const char *word, size_t length)
@@ -107,28 +136,30 @@ static bool is_passed_over(const char *word, size_t length)
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
         if (strlen(words[i]) == length && memcmp(words[i], word, length) == 0)
             return true;
-    return word[0] == '#';
+    return false;
 }
 
 static gbt_status parse_obj(const source_file *file, mesh_data *out, gbt_error *err)
 {
-    const char *at = (const char *)file->bytes, *end = at + file->size, *word;
+    const char *text = (const char *)file->bytes, *word;
     size_t length;
-    raw_place place = {file->name, ':', 0};
-    while (at < end) {
-        const char *newline = memchr(at, '\n', (size_t)(end - at)), *line = at,
-                   *line_end = newline != NULL ? newline : end;
-        at = newline != NULL ? newline + 1 : end;
-        place.at++;
-        if (!number_next_token(&line, line_end, &word, &length) || is_passed_over(word, length))
-            continue;
-        if (length == 1 && word[0] == 'v')
-            GBT_TRY(take_vertex(out, line, line_end, place, err));
-        else if (length == 1 && word[0] == 'f')
-            GBT_TRY(take_face(out, line, line_end, place, err));
-        else
-            return raw_fail(err, place, "not a line of an OBJ mesh: %.*s",
+    obj_text t = {.next = text + file_mark_bytes(text, file->size),
+                  .end = text + file->size,
+                  .place = {file->name, ':', 0}};
+    while (t.next < t.end) {
+        take_line(&t);
+        const bool has_word = next_word(&t, &word, &length);
+        if (has_word && word[0] == '#')
+            t.continues = false; /* a backslash there may end a path of Windows */
+        else if (has_word && length == 1 && word[0] == 'v')
+            GBT_TRY(take_vertex(out, &t, err));
+        else if (has_word && length == 1 && word[0] == 'f')
+            GBT_TRY(take_face(out, &t, err));
+        else if (has_word && !is_passed_over(word, length))
+            return raw_fail(err, t.place, "not a line of an OBJ mesh: %.*s",
                             length < TOKEN_SHOWN ? (int)length : TOKEN_SHOWN, word);
+        while (t.continues && t.next < t.end) /* what is not used of a line */
+            take_line(&t);
     }
     return GBT_OK;
 }

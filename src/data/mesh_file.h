@@ -17,8 +17,9 @@ typedef struct mesh_data {
  *
  * OBJ: `v` (what follows the first three numbers is not used) and `f` (corners as 1, 1/2, 1//3 or 1/2/3;
  * negative numbers count back from the last vertex so far); texture coordinates, normals, groups, materials,
- * lines and points are ignored; curves, surfaces and anything else are an error. PLY: x y z of element
- * vertex, and the list vertex_indices or vertex_index of element face.
+ * lines and points are ignored; curves, surfaces and anything else are an error. A byte order mark may come
+ * first, and a line that ends in a backslash continues on the next one. PLY: x y z of element vertex, and the
+ * list vertex_indices or vertex_index of element face.
  *
  * @param out [out] free with mesh_data_free() after success or failure; at least one triangle
  * @return GBT_OK, GBT_ERR_IO, GBT_ERR_FORMAT ("FILE:LINE: what was wrong"), GBT_ERR_NO_MEMORY

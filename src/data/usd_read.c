@@ -192,6 +192,21 @@ static void skip_value(reading *r)
         skip_group(r);
 }
 
+/* Whether the token is this text in quotes. */
+static bool is_quoted(token t, const char *text)
+{
+    return t.length >= 2 && (*t.at == '"' || *t.at == '\'') && is((token){t.at + 1, t.length - 2}, text);
+}
+
+/* Read the name of the prim's colour space. An empty one states nothing. */
+static gbt_status take_color_space(reading *r, gbt_error *err)
+{
+    token t;
+    if (next(r, &t) && !is_quoted(t, "srgb_rec709_display") && !is_quoted(t, "") && !is(t, "None"))
+        return fail(r, "colours of another space (wanted srgb_rec709_display)", err);
+    return GBT_OK;
+}
+
 /* Whether the token names a transformation. */
 static bool is_transform(token t)
 {
@@ -204,6 +219,8 @@ static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
     bool half = false;
     const field_id f = field_of(name, &half);
     const char *from = r->at;
+    if (is(name, "colorSpace:name"))
+        return take_color_space(r, err);
     if (f == FIELDS || (half && p->fields[f].count > 0)) {
         skip_value(r);
         token value = {.at = r->at};

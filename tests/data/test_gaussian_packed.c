@@ -380,6 +380,7 @@ static const char usda[] =
     "ParticleField3DGaussianSplat\n"
     "def Xform \"World\" (kind = \"group\")\n{\n"
     "  def ParticleField3DGaussianSplat \"one\" (\n    displayName = \"}\"\n  )\n  {\n"
+    "    uniform token colorSpace:name = 'srgb_rec709_display'\n"
     "    half[] opacitiesh = [0.5]\n    custom string note = \"positions = [1]\"\n"
     "    point3f[] positions = [(1, 2.5e0,\n 3)] (interpolation = \"vertex\")\n"
     "    quatf[] orientations = [(0, 2, 0, 0)]\n    float[] opacities = [0.25]\n    float[] other = [7]\n"
@@ -424,6 +425,7 @@ static void usda_that_is_wrong(void **state)
         {"(1, 2, 4)", "(1, 2)", "2 numbers in scales (wanted 3"},
         {"(1, 2, 4)", "(1, x, 4)", "not a number"},
         {"Degree = 1", "Degree = 4", "degree 4"},
+        {"srgb_rec709_display", "lin_rec709_scene", "colours of another space (wanted srgb_rec709_display)"},
         {"Degree = 1", "Degree = 2", "12 numbers of harmonics (wanted 27)"},
         {"(1, 2, 4)", "(1, -2, 4)", "no usable Gaussian"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

@@ -104,6 +104,7 @@ typedef enum field_id {
     HARMONICS,
     DEGREE,
     TRANSLATE,
+    TURN,
     NEAR,
     FIELDS
 } field_id;
@@ -122,6 +123,7 @@ static const struct {
                     {"radiance:sphericalHarmonicsCoefficients", 3},
                     {"radiance:sphericalHarmonicsDegree", 1},
                     {"xformOp:translate", 3},
+                    {"xformOp:rotateZ", 1},
                     {USD_NEAR, 1}};
 
 typedef struct numbers {
@@ -132,6 +134,9 @@ typedef struct numbers {
 typedef struct prim {
     numbers fields[FIELDS];
     double translate[3];    /* in double */
+    bool is_moved;          /* xformOpOrder lists the translation */
+    bool is_turned;         /* it lists the rotation about z */
+    bool is_turned_first;   /* behind the translation, so that it applies first */
     bool ignored_transform; /* there is a transformation that is ignored */
 } prim;
 
@@ -214,22 +219,52 @@ static bool is_transform(token t)
     return t.length >= sizeof place && memcmp(t.at, place, sizeof place - 1) == 0;
 }
 
+/* Read which transformations apply, the last one first. USD ignores those that are not listed. */
+static void take_order(reading *r, prim *p)
+{
+    token t;
+    if (!next(r, &t) || !is(t, "["))
+        return;
+    while (next(r, &t) && !is(t, "]"))
+        if (is_quoted(t, "xformOp:translate"))
+            p->is_moved = true;
+        else if (is_quoted(t, "xformOp:rotateZ")) {
+            p->is_turned = true;
+            p->is_turned_first = p->is_moved;
+        } else
+            p->ignored_transform = true;
+}
+
 static gbt_status take_value(reading *r, prim *p, token name, gbt_error *err)
 {
     bool half = false;
     const field_id f = field_of(name, &half);
-    const char *from = r->at;
     if (is(name, "colorSpace:name"))
         return take_color_space(r, err);
-    if (f == FIELDS || (half && p->fields[f].count > 0)) {
+    if (is(name, "xformOpOrder"))
+        take_order(r, p);
+    else if (f == FIELDS || (half && p->fields[f].count > 0))
         skip_value(r);
-        token value = {.at = r->at};
-        reading again = {.file = r->file, .at = from, .end = r->at};
-        p->ignored_transform |=
-            is_transform(name) && !(is(name, "xformOp:rotateZ") && next(&again, &value) && is(value, "180"));
-        return GBT_OK;
-    }
-    return take_numbers(r, p, f, err);
+    else
+        GBT_TRY(take_numbers(r, p, f, err));
+    return GBT_OK;
+}
+
+/*
+ * What the translation is in our axes. Those are the axes before the half turn about z, which the writer
+ * lists first, so that it applies last: it only turns the axes to USD's. If it applies first, the translation
+ * is along the turned axes.
+ */
+static void place_prim(prim *p)
+{
+    const numbers *turn = &p->fields[TURN];
+    const bool is_half = turn->count == 1 && fabsf(turn->values[0]) == 180;
+    p->ignored_transform |= (p->is_turned && !is_half) || (p->is_moved && p->fields[TRANSLATE].count != 3);
+    for (int k = 0; k < 3; k++)
+        if (!p->is_moved)
+            p->translate[k] = 0;
+        else if (p->is_turned_first && is_half && k < 2)
+            p->translate[k] = 0 - p->translate[k];
 }
 
 /* Read the attributes between the braces of the prim. */
@@ -335,6 +370,7 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     int depth = 0;
     GBT_TRY(find_prim(r, p, &depth, err));
     GBT_TRY(read_prim(r, p, err));
+    place_prim(p);
     p->ignored_transform |= has_later_transform(r, depth);
     GBT_TRY(check(r, p, &functions, err));
     const size_t count = p->fields[POSITIONS].count / 3;

@@ -191,7 +191,8 @@ usd() { # NAME WARNINGS TEXT
     report $? "USD: $1" "$(cat err out)"
 }
 usd "a prim alone, with a translation" 0 "$prim $moved }"
-usd "a prim that is turned" 1 "$prim float xformOp:rotateY = 90 }"
+turned='float xformOp:rotateY = 90 uniform token[] xformOpOrder = ["xformOp:rotateY"]'
+usd "a prim that is turned" 1 "$prim $turned }"
 usd "a prim in one that is moved" 1 "def Xform \"all\" { $moved def Scope \"some\" { $prim } } }"
 usd "a prim in one that says so behind it" 1 "def Xform \"all\" { def Scope \"some\" { $prim } } $moved }"
 usd "a prim in one that is not moved, beside some that are" 0 "def Xform \"all\" { def Xform \"a\" { $moved } $prim } def Xform \"b\" { $moved } } def Xform \"c\" { $moved }"

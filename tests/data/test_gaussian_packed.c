@@ -388,7 +388,8 @@ static const char usda[] =
     "    float3[] radiance:sphericalHarmonicsCoefficients = [(1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)] "
     "(\n"
     "        elementSize = 4\n    )\n    def Scope \"inner\" {\n float[] positions = [9]\n }\n"
-    "    double3 xformOp:translate = (10, 20, 30)\n"
+    "    double3 xformOp:translate = (10, 20, 30)\n    float xformOp:rotateZ = 180.0\n"
+    "    float3 xformOp:scale = (2, 2, 2)\n    uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"
     "  }\n}\n";
 
 static gbt_status read_text(const char *text, gaussian_cloud *out, gbt_error *err)
@@ -438,6 +439,45 @@ static void usda_that_is_wrong(void **state)
         assert_int_equal(read_text(text, &c, &err), GBT_ERR_FORMAT);
         if (strstr(err.text, rows[i][2]) == NULL)
             fail_msg("%s (wanted: %s)", err.text, rows[i][2]);
+    }
+}
+
+/* What the prim's order lists: where its Gaussians are, and whether a warning says that more is left out. */
+static void usda_order_of_transformations(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *old, *new;
+        double x, y, z;
+        bool is_told;
+    } rows[] = {
+        {"[\"xformOp:translate\"]", "[\"xformOp:rotateZ\", \"xformOp:translate\"]", 10, 20, 30, false},
+        {"[\"xformOp:translate\"]", "['xformOp:translate', 'xformOp:rotateZ']", -10, -20, 30, false},
+        {"[\"xformOp:translate\"]", "[\"xformOp:rotateZ\"]", 0, 0, 0, false},
+        {"[\"xformOp:translate\"]", "[]", 0, 0, 0, false},
+        {"[\"xformOp:translate\"]", "None", 0, 0, 0, false},
+        {"uniform token[] xformOpOrder", "custom token[] other", 0, 0, 0, false},
+        {"[\"xformOp:translate\"]", "[\"xformOp:translate\", \"xformOp:scale\"]", 10, 20, 30, true},
+        {"[\"xformOp:translate\"]", "[\"!invert!xformOp:translate\"]", 0, 0, 0, true},
+        {"180.0\n    float3 xformOp:scale = (2, 2, 2)\n    uniform token[] xformOpOrder = [",
+         "90\n    uniform token[] xformOpOrder = [\"xformOp:rotateZ\", ", 10, 20, 30, true},
+        {"xformOp:translate = (10, 20, 30)", "xformOp:translate.timeSamples = {0: (1, 2, 3)}", 0, 0, 0,
+         true}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[sizeof usda + 64], said[256] = "";
+        const char *at = strstr(usda, rows[i].old);
+        assert_non_null(at);
+        snprintf(text, sizeof text, "%.*s%s%s", (int)(at - usda), usda, rows[i].new,
+                 at + strlen(rows[i].old));
+        gaussian_cloud c;
+        gbt_listen(keep_warning, said);
+        assert_ok(read_text(text, &c, &assert_ok_err_));
+        gbt_listen(NULL, NULL);
+        if (c.origin[0] != rows[i].x || c.origin[1] != rows[i].y || c.origin[2] != rows[i].z)
+            fail_msg("%s: %g %g %g", rows[i].new, c.origin[0], c.origin[1], c.origin[2]);
+        if ((strstr(said, "only the translation") != NULL) != rows[i].is_told)
+            fail_msg("%s: %s", rows[i].new, said);
+        gaussian_cloud_free(&c);
     }
 }
 
@@ -612,6 +652,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(usdz_is_aligned, folder_make, folder_remove),
         cmocka_unit_test(usda_of_others),
         cmocka_unit_test(usda_that_is_wrong),
+        cmocka_unit_test(usda_order_of_transformations),
         cmocka_unit_test(levels_follow_the_values),
         cmocka_unit_test(palette_entries_are_means),
         cmocka_unit_test(sog_meta_that_is_wrong),

@@ -22,7 +22,8 @@ enum {
 #define GLB_NEAR "gbtrace_near"
 
 /** Read the first primitive with KHR_gaussian_splatting; compressed or sparse data is an error. The
-    translation of its node becomes the origin. */
+    translation of its first node becomes the origin. A warning counts primitives and nodes if there are
+    more. */
 gbt_status glb_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
 #endif

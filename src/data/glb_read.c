@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "base/log.h"
 #include "data/json_fields.h"
 
 typedef struct reading {
@@ -53,14 +54,14 @@ static gbt_status read_chunks(reading *r, gbt_error *err)
 static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
 {
     const json_t *mesh, *primitive;
-    size_t i, k;
+    size_t i, k, count = 0;
     json_array_foreach(json_object_get(r->root, "meshes"), i, mesh)
     {
         json_array_foreach(json_object_get(mesh, "primitives"), k, primitive)
         {
             const json_t *own =
                 json_object_get(json_object_get(primitive, "extensions"), "KHR_gaussian_splatting");
-            if (own == NULL)
+            if (own == NULL || count++ > 0)
                 continue;
             const json_t *space = json_object_get(own, "colorSpace");
             if (json_is_string(space) && strcmp(json_string_value(space), "srgb_rec709_display") != 0)
@@ -69,10 +70,11 @@ static gbt_status find_primitive(reading *r, size_t *mesh_index, gbt_error *err)
                 return wrong(r, "compressed Gaussians are not read", err);
             r->attributes = json_object_get(primitive, "attributes");
             *mesh_index = i;
-            return GBT_OK;
         }
     }
-    return wrong(r, "no primitive has KHR_gaussian_splatting", err);
+    if (count > 1)
+        log_warn("%s: only the first of %zu primitives of Gaussians is read", r->file->name, count);
+    return count > 0 ? GBT_OK : wrong(r, "no primitive has KHR_gaussian_splatting", err);
 }
 
 /* Whether the node has this array of numbers, with values other than `wanted`. */
@@ -100,10 +102,13 @@ static bool has_mesh(const json_t *node, size_t mesh_index)
     return json_is_integer(mesh) && json_integer_value(mesh) == (json_int_t)mesh_index;
 }
 
-/* Mark the nodes of the mesh, and all their ancestors, in `holds_mesh`. `parent` starts as [count] zeros. */
-static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, bool *holds_mesh)
+/* Mark the first node of the mesh, and all its ancestors, in `holds_mesh`. `parent` starts as [count] zeros.
+   Returns that node's index, or `count` if there is none. */
+static size_t find_node(const reading *r, const json_t *nodes, size_t mesh_index, size_t *parent,
+                        bool *holds_mesh)
 {
     const size_t count = json_array_size(nodes);
+    size_t first = count, own = 0;
     const json_t *node, *child;
     size_t i, k;
     json_array_foreach(nodes, i, node)
@@ -117,14 +122,19 @@ static void find_nodes(const json_t *nodes, size_t mesh_index, size_t *parent, b
     }
     json_array_foreach(nodes, i, node)
     {
-        for (k = has_mesh(node, mesh_index) ? i + 1 : 0; k != 0 && !holds_mesh[k - 1]; k = parent[k - 1])
-            holds_mesh[k - 1] = true;
+        if (has_mesh(node, mesh_index) && own++ == 0)
+            first = i;
     }
+    for (k = own > 0 ? first + 1 : 0; k != 0 && !holds_mesh[k - 1]; k = parent[k - 1])
+        holds_mesh[k - 1] = true;
+    if (own > 1)
+        log_warn("%s: only the first of %zu nodes of the Gaussians' mesh is read", r->file->name, own);
+    return first;
 }
 
 /* The translation of the mesh's node becomes the cloud's origin. Any other transformation of that node or its
    ancestors is an error; other nodes (cameras, lights and so on) are ignored. */
-static gbt_status place_of(const reading *r, const json_t *nodes, const bool *holds_mesh, size_t mesh_index,
+static gbt_status place_of(const reading *r, const json_t *nodes, const bool *holds_mesh, size_t own_node,
                            double place[3], gbt_error *err)
 {
     static const double nowhere[3] = {0, 0, 0};
@@ -133,7 +143,7 @@ static gbt_status place_of(const reading *r, const json_t *nodes, const bool *ho
     json_array_foreach(nodes, i, node)
     {
         const json_t *translation = json_object_get(node, "translation");
-        const bool own = has_mesh(node, mesh_index);
+        const bool own = i == own_node;
         if (holds_mesh[i] &&
             (is_rotated_or_scaled(node) || (!own && differs(node, "translation", nowhere, 3))))
             return wrong(r,
@@ -156,8 +166,8 @@ static gbt_status read_place(const reading *r, size_t mesh_index, double place[3
     bool *holds_mesh = mem_calloc(count, sizeof *holds_mesh, "nodes", err);
     gbt_status status = parent != NULL && holds_mesh != NULL ? GBT_OK : GBT_ERR_NO_MEMORY;
     if (status == GBT_OK) {
-        find_nodes(nodes, mesh_index, parent, holds_mesh);
-        status = place_of(r, nodes, holds_mesh, mesh_index, place, err);
+        const size_t own_node = find_node(r, nodes, mesh_index, parent, holds_mesh);
+        status = place_of(r, nodes, holds_mesh, own_node, place, err);
     }
     mem_free(parent);
     mem_free(holds_mesh);

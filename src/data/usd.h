@@ -15,9 +15,9 @@
 #define USD_NEAR "gbtrace:near"
 
 /**
- * Read the first such prim of a text, as gaussian_format.read. Its translation becomes the origin. Its other
- * transformations, except that half turn, are ignored with a warning, and so are all transformations of its
- * parents.
+ * Read the first such prim of a text, as gaussian_format.read; a warning counts them if there are more. Its
+ * translation becomes the origin. The other transformations that its xformOpOrder lists, except that half
+ * turn, are ignored with a warning, and so are all transformations of its parents.
  */
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 

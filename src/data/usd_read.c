@@ -308,19 +308,23 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
     return base_fail(err, GBT_ERR_FORMAT, "%s: holds no prim of type %s", r->file->name, prim_type);
 }
 
-/* Whether an ancestor of the prim just read has a transformation that comes later in the text. */
-static bool has_later_transform(reading *r, int depth)
+/* Read the text behind the prim: transformations of its `depth` ancestors, and how many more prims there
+   are. */
+static size_t read_rest(reading *r, prim *p, int depth)
 {
     token t;
-    for (int inside = 0; depth > 0 && next(r, &t);) {
+    size_t more = 0;
+    bool defined = false;
+    for (int inside = 0; next(r, &t); defined = is(t, "def")) {
         if (is(t, "{"))
             inside++;
         else if (is(t, "}"))
             *(inside > 0 ? &inside : &depth) -= 1;
-        else if (inside == 0 && is_transform(t))
-            return true;
+        else if (inside == 0 && depth > 0 && is_transform(t))
+            p->ignored_transform = true;
+        more += defined && is(t, prim_type);
     }
-    return false;
+    return more;
 }
 
 /* ---- Gaussians ---- */
@@ -371,7 +375,7 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     GBT_TRY(find_prim(r, p, &depth, err));
     GBT_TRY(read_prim(r, p, err));
     place_prim(p);
-    p->ignored_transform |= has_later_transform(r, depth);
+    const size_t more = read_rest(r, p, depth);
     GBT_TRY(check(r, p, &functions, err));
     const size_t count = p->fields[POSITIONS].count / 3;
     GBT_TRY(gaussian_cloud_alloc(out, count, err));
@@ -382,6 +386,8 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
     out->sh_degree = functions == 16 ? 3 : functions == 9 ? 2 : functions == 4 ? 1 : 0;
     for (size_t i = 0; i < count; i++)
         add_gaussian(p, i, functions, out);
+    if (more > 0)
+        log_warn("%s: only the first of %zu prims of Gaussians is read", r->file->name, more + 1);
     if (p->ignored_transform)
         log_warn("%s: only the translation of the Gaussians' prim is used; its rotation and scale, and the "
                  "transformations of its parents, are ignored",

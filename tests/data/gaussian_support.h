@@ -5,6 +5,7 @@
 
 #include "base/rng.h"
 #include "data/data_support.h"
+#include "gbtrace/progress.h"
 
 static const double nowhere[3] = {0, 0, 0};
 
@@ -34,6 +35,13 @@ static inline void make_cloud(gaussian_cloud *c, size_t count, int degree)
             c->sh[48 * i + k] =
                 k < 3 * (size_t)((degree + 1) * (degree + 1)) ? between(5, 48 * i + k, -0.9f, 0.9f) : 0;
     }
+}
+
+/** A listener for gbt_listen(): the last warning, in a char[256]. */
+static inline void keep_warning(const gbt_event *event, void *context)
+{
+    if (event->kind == GBT_EVENT_WARNING)
+        snprintf(context, 256, "%s", event->text);
 }
 
 /* How far a format may move a value; scales as logs. */

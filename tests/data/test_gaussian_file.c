@@ -264,6 +264,29 @@ static void glb_that_is_wrong(void **state)
     gaussian_cloud_free(&a);
 }
 
+/* Read a .glb with another JSON, and keep what is said in `warned`. */
+static gbt_status read_changed(const source_file *file, const json_t *root, gaussian_cloud *out,
+                               char warned[256], gbt_error *err)
+{
+    cursor c = {.file = file, .at = 12};
+    const size_t length = cursor_u32(&c);
+    char *text = json_dumps(root, 0);
+    sink s = {0};
+    sink_put(&s, file->bytes, 12);
+    sink_put_uint(&s, strlen(text), 4);
+    sink_put(&s, "JSON", 4);
+    sink_put(&s, text, strlen(text));
+    sink_put(&s, file->bytes + 20 + length, file->size - 20 - length);
+    const source_file changed = {file->name, s.bytes, s.size};
+    warned[0] = '\0';
+    gbt_listen(keep_warning, warned);
+    const gbt_status status = gaussian_format_glb.read(&changed, out, err);
+    gbt_listen(NULL, NULL);
+    sink_free(&s);
+    free(text);
+    return status;
+}
+
 /* Nodes beside the Gaussians' own, and those that they are in. */
 static void glb_nodes_of_others(void **state)
 {
@@ -296,29 +319,65 @@ static void glb_nodes_of_others(void **state)
     const size_t length = cursor_u32(&c);
     json_t *root = json_loadb((const char *)bytes + 20, length, 0, NULL);
     for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
-        char nodes[512];
+        char nodes[512], warned[256];
         snprintf(nodes, sizeof nodes, "[%s,%s]", own, rows[r].other);
         json_object_set_new(root, "nodes", json_loads(nodes, 0, NULL));
-        char *text = json_dumps(root, 0);
-        sink s = {0};
-        sink_put(&s, bytes, 12);
-        sink_put_uint(&s, strlen(text), 4);
-        sink_put(&s, "JSON", 4);
-        sink_put(&s, text, strlen(text));
-        sink_put(&s, bytes + 20 + length, size - 20 - length);
-        const source_file changed = {"n.glb", s.bytes, s.size};
         gbt_error said = {0};
-        const gbt_status status = gaussian_format_glb.read(&changed, &b, &said);
+        const gbt_status status = read_changed(&file, root, &b, warned, &said);
+        assert_string_equal(warned, "");
         if (status != (rows[r].is_read ? GBT_OK : GBT_ERR_FORMAT))
             fail_msg("%s: %s", rows[r].other, said.text);
         assert_true(status == GBT_OK ? b.origin[0] == -1 && b.origin[1] == -2 && b.origin[2] == 3
                                      : strstr(said.text, "or a parent a translation") != NULL);
         gaussian_cloud_free(&b);
-        sink_free(&s);
-        free(text);
     }
     json_decref(root);
     mem_free(bytes);
+}
+
+/* A mesh of twice the same primitive, and that mesh once more; a mesh in several nodes, of which others than
+   the first may be turned, or in one that is scaled. */
+static void glb_of_several(void **state)
+{
+    (void)state;
+    static const char first[] = "{\"mesh\":0,\"translation\":[1,2,3]}";
+    static const struct {
+        const char *others, *says;
+    } rows[] = {
+        {"{\"mesh\":0,\"translation\":[7,8,9],\"rotation\":[0,1,0,0]}", "first of 2 nodes of the Gaussians'"},
+        {"{\"mesh\":0},{\"children\":[1],\"scale\":[2,2,2]},{\"mesh\":0}",
+         "first of 3 nodes of the Gaussians'"},
+        {"{\"mesh\":1}", "first of 4 primitives of Gaussians"}};
+    gaussian_cloud a, b;
+    make_cloud(&a, 5, 0);
+    assert_ok(gaussian_file_write(in_folder("p.glb"), &a, nowhere, &assert_ok_err_));
+    unsigned char *bytes;
+    size_t size;
+    assert_ok(file_read(in_folder("p.glb"), &bytes, &size, &assert_ok_err_));
+    const source_file file = {"p.glb", bytes, size};
+    cursor c = {.file = &file, .at = 12};
+    const size_t length = cursor_u32(&c);
+    json_t *root = json_loadb((const char *)bytes + 20, length, 0, NULL),
+           *meshes = json_object_get(root, "meshes"),
+           *primitives = json_object_get(json_array_get(meshes, 0), "primitives");
+    for (size_t r = 0; r < sizeof rows / sizeof *rows; r++) {
+        char nodes[256], warned[256];
+        snprintf(nodes, sizeof nodes, "[%s,%s]", first, rows[r].others);
+        json_object_set_new(root, "nodes", json_loads(nodes, 0, NULL));
+        if (r == 2) {
+            json_array_append_new(primitives, json_deep_copy(json_array_get(primitives, 0)));
+            json_array_append_new(meshes, json_deep_copy(json_array_get(meshes, 0)));
+        }
+        assert_ok(read_changed(&file, root, &b, warned, &assert_ok_err_));
+        if (strstr(warned, rows[r].says) == NULL)
+            fail_msg("%s: %s", rows[r].says, warned);
+        const double origin[3] = {-1, -2, 3};
+        check_near(&a, &b, origin, &(limits){.mean = 1e-8, .scale = 1e-6, .quat = 1e-6, .opacity = 1e-7});
+        gaussian_cloud_free(&b);
+    }
+    json_decref(root);
+    mem_free(bytes);
+    gaussian_cloud_free(&a);
 }
 
 static void glb_is_what_gltf_wants(void **state)
@@ -442,6 +501,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(glb_round_trip, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(glb_that_is_wrong, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(glb_nodes_of_others, folder_make, folder_remove),
+        cmocka_unit_test_setup_teardown(glb_of_several, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(glb_is_what_gltf_wants, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(refusals, folder_make, folder_remove),
     };

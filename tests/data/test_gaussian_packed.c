@@ -10,7 +10,6 @@
 #include "data/gaussian_support.h"
 #include "data/palette.h"
 #include "data/spz_streams.h"
-#include "gbtrace/progress.h"
 
 /* Write, read, and bring back into order. */
 static void there_and_back(const char *path, const gaussian_cloud *a, const double origin[3],
@@ -132,12 +131,6 @@ static void spz4_of_degree_4(void **state)
     gaussian_cloud_free(&c);
     header.version = 3;
     assert_int_equal(spz_header_check(&header, "a", NULL), GBT_ERR_FORMAT);
-}
-
-static void keep_warning(const gbt_event *event, void *context)
-{
-    if (event->kind == GBT_EVENT_WARNING)
-        snprintf(context, 256, "%s", event->text);
 }
 
 /* Flat ones are drawn alike; large and tiny ones are not. */
@@ -481,6 +474,28 @@ static void usda_order_of_transformations(void **state)
     }
 }
 
+/* Further prims, behind the first one and beside what it is in; not what only has the type's name. */
+static void usda_of_several_prims(void **state)
+{
+    (void)state;
+    static const char other[] = "def ParticleField3DGaussianSplat \"two\" {\n float[] scales = [1]\n}\n"
+                                "over ParticleField3DGaussianSplat \"no\" {\n}\n";
+    for (int more = 0; more < 3; more++) {
+        char text[sizeof usda + 2 * sizeof other], said[256] = "", want[64] = "";
+        snprintf(text, sizeof text, "%.*s%s}\n%s", (int)strlen(usda) - 2, usda, more > 0 ? other : "",
+                 more > 1 ? other : "");
+        if (more > 0)
+            snprintf(want, sizeof want, "a.usda: only the first of %d prims of Gaussians is read", more + 1);
+        gaussian_cloud c;
+        gbt_listen(keep_warning, said);
+        assert_ok(read_text(text, &c, &assert_ok_err_));
+        gbt_listen(NULL, NULL);
+        assert_true(c.count == 1 && c.origin[0] == 10);
+        gaussian_cloud_free(&c);
+        assert_string_equal(said, want);
+    }
+}
+
 /* Coordinates of a country too: floats keep half a metre of them. */
 static void usd_keeps_everything(void **state)
 {
@@ -653,6 +668,7 @@ int main(void)
         cmocka_unit_test(usda_of_others),
         cmocka_unit_test(usda_that_is_wrong),
         cmocka_unit_test(usda_order_of_transformations),
+        cmocka_unit_test(usda_of_several_prims),
         cmocka_unit_test(levels_follow_the_values),
         cmocka_unit_test(palette_entries_are_means),
         cmocka_unit_test(sog_meta_that_is_wrong),

@@ -2,6 +2,7 @@
 /* data/archive.c -- reads and writes .zip archives in memory with libzip. */
 #include "data/archive.h"
 
+#include <stdio.h>
 #include <zip.h>
 
 enum {
@@ -156,6 +157,35 @@ gbt_status archive_take(const source_file *file, const char *member, unsigned ch
     return status;
 }
 
+/* The name of member `index`, or NULL if it has another ending. */
+static const char *name_with_ending(zip_t *archive, zip_int64_t index, const char *ending)
+{
+    const char *name = zip_get_name(archive, (zip_uint64_t)index, 0);
+    const size_t length = name == NULL ? 0 : strlen(name), wanted = strlen(ending);
+    return length > wanted && strcmp(name + length - wanted, ending) == 0 ? name : NULL;
+}
+
+gbt_status archive_take_first(const source_file *file, const char *ending, archive_wanted *wanted, char *name,
+                              size_t name_size, unsigned char **bytes, size_t *size, gbt_error *err)
+{
+    zip_t *archive;
+    *bytes = NULL;
+    GBT_TRY(open_archive(file, &archive, err));
+    gbt_status status = GBT_OK;
+    const zip_int64_t count = zip_get_num_entries(archive, 0);
+    for (zip_int64_t i = 0; i < count && status == GBT_OK && *bytes == NULL; i++) {
+        const char *member = name_with_ending(archive, i, ending);
+        if (member == NULL)
+            continue;
+        status = take(archive, file, member, bytes, size, err);
+        snprintf(name, name_size, "%s: %s", file->name, member);
+        if (status == GBT_OK && !wanted(&(source_file){name, *bytes, *size}))
+            mem_free(*bytes), *bytes = NULL;
+    }
+    zip_discard(archive);
+    return status;
+}
+
 gbt_status archive_find(const source_file *file, const char *ending, char *out, size_t out_size,
                         gbt_error *err)
 {
@@ -164,10 +194,9 @@ gbt_status archive_find(const source_file *file, const char *ending, char *out, 
     gbt_status status = base_fail(NULL, GBT_ERR_FORMAT, "-");
     const zip_int64_t count = zip_get_num_entries(archive, 0);
     for (zip_int64_t i = 0; i < count && status != GBT_OK; i++) {
-        const char *name = zip_get_name(archive, (zip_uint64_t)i, 0);
-        const size_t length = name == NULL ? 0 : strlen(name), wanted = strlen(ending);
-        if (length > wanted && length < out_size && strcmp(name + length - wanted, ending) == 0) {
-            memcpy(out, name, length + 1);
+        const char *name = name_with_ending(archive, i, ending);
+        if (name != NULL && strlen(name) < out_size) {
+            memcpy(out, name, strlen(name) + 1);
             status = GBT_OK;
         }
     }

@@ -29,6 +29,18 @@ gbt_status archive_put(sink *out, const char *path, const archive_member *member
 gbt_status archive_take(const source_file *file, const char *member, unsigned char **bytes, size_t *size,
                         gbt_error *err);
 
+/** Whether a member is the one that is looked for. */
+typedef bool archive_wanted(const source_file *member);
+
+/**
+ * Extract the first member with this ending that is wanted, as archive_take().
+ *
+ * @param name  [out] its name, as FILE: MEMBER
+ * @param bytes [out] NULL when there is none
+ */
+gbt_status archive_take_first(const source_file *file, const char *ending, archive_wanted *wanted, char *name,
+                              size_t name_size, unsigned char **bytes, size_t *size, gbt_error *err);
+
 /** Write the name of the first member with this ending into `out`. GBT_ERR_FORMAT when there is none. */
 gbt_status archive_find(const source_file *file, const char *ending, char *out, size_t out_size,
                         gbt_error *err);

@@ -21,7 +21,7 @@
  */
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
-/** Read the first .usda in a package. */
+/** Read the first .usda in a package that has such a prim. */
 gbt_status usdz_read(const source_file *file, gaussian_cloud *out, gbt_error *err);
 
 #endif

@@ -283,6 +283,11 @@ static gbt_status read_prim(reading *r, prim *p, gbt_error *err)
     return fail(r, "the text ends inside the prim", err);
 }
 
+static gbt_status fail_without_prim(const char *name, gbt_error *err)
+{
+    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no prim of type %s", name, prim_type);
+}
+
 /* Advance to behind the opening brace of the first prim of Gaussians. `depth`: how many ancestors it has. */
 static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
 {
@@ -305,7 +310,7 @@ static gbt_status find_prim(reading *r, prim *p, int *depth, gbt_error *err)
         p->ignored_transform |= transform_depth != 0;
         return GBT_OK;
     }
-    return base_fail(err, GBT_ERR_FORMAT, "%s: holds no prim of type %s", r->file->name, prim_type);
+    return fail_without_prim(r->file->name, err);
 }
 
 /* Read the text behind the prim: transformations of its `depth` ancestors, and how many more prims there
@@ -397,15 +402,24 @@ static gbt_status read_text(reading *r, prim *p, gaussian_cloud *out, gbt_error 
                                       r->file->name, out->dropped);
 }
 
+static reading start(const source_file *file)
+{
+    const char *text = (const char *)file->bytes;
+    return (reading){.file = file, .at = text, .end = text + file->size};
+}
+
+static gbt_status refuse_binary(const char *name, gbt_error *err)
+{
+    return base_fail(err, GBT_ERR_FORMAT, "%s: binary USD (wanted text: convert it with usdcat)", name);
+}
+
 gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
-    reading r = {
-        .file = file, .at = (const char *)file->bytes, .end = (const char *)file->bytes + file->size};
+    reading r = start(file);
     prim p = {0};
     memset(out, 0, sizeof *out);
     if (file->size >= 8 && memcmp(file->bytes, "PXR-USDC", 8) == 0)
-        return base_fail(err, GBT_ERR_FORMAT, "%s: binary USD (wanted text: convert it with usdcat)",
-                         file->name);
+        return refuse_binary(file->name, err);
     if (file->size < 6 || memcmp(file->bytes, "#usda ", 6) != 0)
         return base_fail(err, GBT_ERR_FORMAT, "%s: not USD text (wanted a file that begins with #usda)",
                          file->name);
@@ -417,15 +431,27 @@ gbt_status usda_read(const source_file *file, gaussian_cloud *out, gbt_error *er
     return status;
 }
 
+static bool has_prim(const source_file *file)
+{
+    reading r = start(file);
+    prim p = {0};
+    int depth = 0;
+    return find_prim(&r, &p, &depth, NULL) == GBT_OK;
+}
+
 gbt_status usdz_read(const source_file *file, gaussian_cloud *out, gbt_error *err)
 {
-    char name[512], full[1024];
+    char name[1024];
     unsigned char *bytes;
-    source_file inside = {.name = full};
+    source_file inside = {.name = name};
     memset(out, 0, sizeof *out);
-    GBT_TRY(archive_find(file, ".usda", name, sizeof name, err));
-    GBT_TRY(archive_take(file, name, &bytes, &inside.size, err));
-    snprintf(full, sizeof full, "%.500s: %s", file->name, name);
+    GBT_TRY(archive_take_first(file, ".usda", has_prim, name, sizeof name, &bytes, &inside.size, err));
+    if (bytes == NULL) {
+        if (archive_find(file, ".usdc", name, sizeof name, NULL) == GBT_OK)
+            return refuse_binary(file->name, err);
+        GBT_TRY(archive_find(file, ".usda", name, sizeof name, err));
+        return fail_without_prim(file->name, err);
+    }
     inside.bytes = bytes;
     const gbt_status status = usda_read(&inside, out, err);
     mem_free(bytes);

@@ -514,6 +514,39 @@ static void usd_keeps_everything(void **state)
     }
 }
 
+/* Packages of several files: what is read, or said. */
+static void usdz_of_others(void **state)
+{
+    (void)state;
+    static const char empty[] = "#usda 1.0\n( subLayers = [@b.usda@] )\n", binary[] = "PXR-USDC";
+    static const struct {
+        archive_member members[3];
+        const char *says; /* NULL: it is read */
+    } rows[] = {
+        {{{"a.usda", empty, sizeof empty - 1}, {"c.usdc", binary, 8}, {"b.usda", usda, sizeof usda - 1}},
+         NULL},
+        {{{"a.usda", empty, sizeof empty - 1}, {"c.usdc", binary, 8}, {"d.png", "", 0}},
+         "p.usdz: binary USD (wanted text: convert it with usdcat)"},
+        {{{"c.usdc", binary, 8}, {"d.png", "", 0}, {"e.png", "", 0}},
+         "p.usdz: binary USD (wanted text: convert it with usdcat)"},
+        {{{"a.usda", empty, sizeof empty - 1}, {"b.usda", "", 0}, {"d.png", "", 0}},
+         "p.usdz: holds no prim of type ParticleField3DGaussianSplat"},
+        {{{"d.png", "", 0}, {"e.png", "", 0}, {"f.png", "", 0}}, "p.usdz: has no .usda file inside"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        sink s = {0};
+        gaussian_cloud c;
+        gbt_error err = {0};
+        assert_ok(archive_put(&s, "p.usdz", rows[i].members, 3, 64, &assert_ok_err_));
+        const source_file file = {"p.usdz", s.bytes, s.size};
+        const gbt_status status = gaussian_format_usdz.read(&file, &c, &err);
+        assert_int_equal(status, rows[i].says == NULL ? GBT_OK : GBT_ERR_FORMAT);
+        assert_string_equal(err.text, rows[i].says == NULL ? "" : rows[i].says);
+        assert_int_equal(c.count, rows[i].says == NULL ? 1 : 0);
+        gaussian_cloud_free(&c);
+        sink_free(&s);
+    }
+}
+
 /* Bytes of a package begin at a multiple of 64: so it can be mapped. */
 static void usdz_is_aligned(void **state)
 {
@@ -666,6 +699,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(usd_keeps_everything, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(usdz_is_aligned, folder_make, folder_remove),
         cmocka_unit_test(usda_of_others),
+        cmocka_unit_test(usdz_of_others),
         cmocka_unit_test(usda_that_is_wrong),
         cmocka_unit_test(usda_order_of_transformations),
         cmocka_unit_test(usda_of_several_prims),

@@ -34,7 +34,7 @@ static void unpack_rows(size_t block, size_t begin, size_t end, void *context)
     for (size_t i = begin; i < end; i++) {
         const float *row = job->load->raw + i * store->row_floats;
         for (size_t k = 0; k < 3; k++)
-            cloud->mean[3 * i + k] = (float)((double)row[CELL_ROW_MEAN + k] - store->origin[k]);
+            cloud->mean[3 * i + k] = (float)((double)row[CELL_ROW_MEAN + k] - store->middle[k]);
         memcpy(cloud->scale_log + 3 * i, row + CELL_ROW_SCALE, 3 * sizeof *row);
         memcpy(cloud->quat + 4 * i, row + CELL_ROW_QUAT, 4 * sizeof *row);
         cloud->opacity[i] = row[CELL_ROW_OPACITY];

@@ -261,14 +261,16 @@ static void make_local(sorting *s)
             low[k] = fmin(low[k], (double)store->chunks[i].low[k]);
             high[k] = fmax(high[k], (double)store->chunks[i].high[k]);
         }
-    gaussian_middle(s->sample, s->sample_count, low, high, store->origin);
+    gaussian_middle(s->sample, s->sample_count, low, high, store->middle);
     for (size_t i = 0; i < store->chunk_count; i++)
         for (int k = 0; k < 3 && store->chunks[i].count > 0; k++) {
-            store->chunks[i].low[k] = (float)((double)store->chunks[i].low[k] - store->origin[k]);
-            store->chunks[i].high[k] = (float)((double)store->chunks[i].high[k] - store->origin[k]);
+            store->chunks[i].low[k] = (float)((double)store->chunks[i].low[k] - store->middle[k]);
+            store->chunks[i].high[k] = (float)((double)store->chunks[i].high[k] - store->middle[k]);
         }
+    for (int k = 0; k < 3; k++)
+        store->origin[k] = s->ply.origin[k] + store->middle[k];
     for (size_t i = 0; i + 1 < store->chunk_count; i++)
-        store->cuts[i].at = (float)((double)store->cuts[i].at - store->origin[store->cuts[i].axis]);
+        store->cuts[i].at = (float)((double)store->cuts[i].at - store->middle[store->cuts[i].axis]);
 }
 
 static gbt_status sort_rows(sorting *s, gbt_error *err)

@@ -45,6 +45,7 @@ typedef struct cell_store {
     size_t count;     /* Gaussians */
     double origin[3]; /* middle of the means, in the coordinates of the file; local coordinates are relative
                          to it */
+    double middle[3]; /* the same in the coordinates of the rows */
     int sh_degree;
     bool antialiased; /* as in gaussian_cloud */
     float near;

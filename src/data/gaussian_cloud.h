@@ -28,7 +28,7 @@ enum { GAUSSIAN_SH_COUNT = 16 };
  */
 typedef struct gaussian_cloud {
     size_t count;
-    double origin[3]; /* add it to every mean; not 0 only for formats that store a position in double */
+    double origin[3]; /* add it to every mean; not 0 only for files with a position, or means, in double */
     float *mean;      /* [count][3] */
     float *scale_log; /* [count][3], natural log of the standard deviation; ratio limited */
     float *quat;      /* [count][4], w x y z, unit */

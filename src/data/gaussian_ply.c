@@ -4,7 +4,9 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
+#include "base/compare.h"
 #include "data/compressed_ply.h"
 #include "data/number.h"
 #include "data/ply.h"
@@ -40,7 +42,8 @@ static void add_row(void *context, const double *values)
 {
     const gaussian_rows *rows = context;
     gaussian_row row = {.opacity = 1 / (1 + exp(-values[COLUMN_OPACITY]))};
-    memcpy(row.mean, values + COLUMN_MEAN, sizeof row.mean);
+    for (size_t k = 0; k < 3; k++)
+        row.mean[k] = values[COLUMN_MEAN + k] - rows->out->origin[k];
     memcpy(row.scale_log, values + COLUMN_SCALE, sizeof row.scale_log);
     memcpy(row.quat, values + COLUMN_ROT, sizeof row.quat);
     /* f_rest is channel-major in the file: all of red, then green, then blue. */
@@ -107,6 +110,58 @@ static gbt_status find_columns(const source_file *file, const ply_header *header
     return GBT_OK;
 }
 
+/* ---- the origin of coordinates in double ---- */
+
+enum { SAMPLE_ROWS = 1024 };
+
+/* Means of rows all over the file. */
+typedef struct mean_sample {
+    size_t row_count, row; /* of the file; how many of them were offered */
+    size_t taken, count;   /* rows taken so far; how many of them are usable */
+    double values[3][SAMPLE_ROWS];
+} mean_sample;
+
+/* The next row that belongs to the sample; `row_count` when there is none. */
+static size_t next_sample_row(const mean_sample *s)
+{
+    const size_t wanted = smaller_size(s->row_count, SAMPLE_ROWS);
+    return s->taken < wanted ? (size_t)((uint64_t)s->taken * s->row_count / wanted) : s->row_count;
+}
+
+static void take_sample_row(void *context, const double *mean)
+{
+    mean_sample *s = context;
+    s->taken++;
+    if (!(fabs(mean[0]) <= RAW_COORDINATE_LIMIT && fabs(mean[1]) <= RAW_COORDINATE_LIMIT &&
+          fabs(mean[2]) <= RAW_COORDINATE_LIMIT))
+        return;
+    for (size_t k = 0; k < 3; k++)
+        s->values[k][s->count] = mean[k];
+    s->count++;
+}
+
+static void offer_row(void *context, const double *mean)
+{
+    mean_sample *s = context;
+    if (s->row++ == next_sample_row(s))
+        take_sample_row(s, mean);
+}
+
+/* Around their median floats keep the digits of map coordinates. */
+static void find_origin(mean_sample *s, double origin[3])
+{
+    for (size_t k = 0; k < 3 && s->count > 0; k++) {
+        qsort(s->values[k], s->count, sizeof *s->values[k], compare_doubles);
+        origin[k] = round(s->values[k][s->count / 2]) + 0.0; /* never -0 */
+    }
+}
+
+static bool is_double(const ply_header *header, int vertex, const int *columns)
+{
+    return header->properties[header->elements[vertex].first_property + (size_t)columns[COLUMN_MEAN]].type ==
+           PLY_DOUBLE;
+}
+
 static int degree_of(size_t rest_count)
 {
     return rest_count == 45 ? 3 : rest_count == 24 ? 2 : rest_count == 9 ? 1 : 0;
@@ -124,7 +179,11 @@ static gbt_status read_plain(const source_file *file, const ply_header *header, 
         return base_fail(err, GBT_ERR_FORMAT, "%s@%zu: %llu Gaussians cannot be in the %zu bytes that follow",
                          file->name, header->data_at, (unsigned long long)row_count,
                          file->size - header->data_at);
+    mean_sample sample = {.row_count = (size_t)row_count};
+    if (is_double(header, vertex, columns))
+        GBT_TRY(ply_read_rows(file, header, vertex, columns, 3, offer_row, &sample, err));
     GBT_TRY(gaussian_cloud_alloc(out, (size_t)row_count, err));
+    find_origin(&sample, out->origin);
     out->count = 0; /* counts the usable rows from here on */
     out->sh_degree = degree_of(rows.rest_count);
     return ply_read_rows(file, header, vertex, columns, FIXED_COLUMNS + rows.rest_count + rows.has_filter,
@@ -186,6 +245,34 @@ bool gaussian_ply_has_gaussians(const source_file *file)
 
 /* ---- reading in parts ---- */
 
+/* Read rows as a file of their own: `column_count` of the columns. */
+static gbt_status read_rows(const gaussian_ply_parts *parts, size_t first, size_t count, unsigned char *bytes,
+                            size_t column_count, ply_row *row, void *context, gbt_error *err)
+{
+    const size_t size = count * parts->row_bytes;
+    GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes,
+                            size, err));
+    ply_header header = parts->header;
+    header.element_count = 1;
+    header.elements[0].count = count;
+    header.data_at = 0;
+    const source_file file = {parts->file.name, bytes, size};
+    return ply_read_rows(&file, &header, 0, parts->columns, column_count, row, context, err);
+}
+
+/* The origin that gaussian_ply_read() finds. */
+static gbt_status find_origin_of_parts(gaussian_ply_parts *parts, gbt_error *err)
+{
+    mean_sample sample = {.row_count = parts->count};
+    unsigned char *bytes = mem_alloc(parts->row_bytes, 1, "a row of Gaussians", err);
+    gbt_status status = bytes == NULL ? GBT_ERR_NO_MEMORY : GBT_OK;
+    for (size_t row; status == GBT_OK && (row = next_sample_row(&sample)) < parts->count;)
+        status = read_rows(parts, row, 1, bytes, 3, take_sample_row, &sample, err);
+    mem_free(bytes);
+    find_origin(&sample, parts->origin);
+    return status;
+}
+
 static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_error *err)
 {
     GBT_TRY(large_file_open(path, &out->file, err));
@@ -215,7 +302,7 @@ static gbt_status open_parts(const char *path, gaussian_ply_parts *out, gbt_erro
     out->antialiased = header_contains(&head, header, "\n" GAUSSIAN_PLY_MIP) ||
                        header_contains(&head, header, "\ncomment antialiased 1");
     out->near = near_of(&head, header);
-    return GBT_OK;
+    return is_double(header, vertex, out->columns) ? find_origin_of_parts(out, err) : GBT_OK;
 }
 
 gbt_status gaussian_ply_open(const char *path, gaussian_ply_parts *out, gbt_error *err)
@@ -245,20 +332,12 @@ static void add_part_row(void *context, const double *values)
 gbt_status gaussian_ply_part(const gaussian_ply_parts *parts, size_t first, size_t count,
                              unsigned char *bytes, gaussian_cloud *out, uint32_t *kept, gbt_error *err)
 {
-    const size_t size = count * parts->row_bytes;
-    GBT_TRY(large_file_read(&parts->file, parts->header.data_at + (uint64_t)first * parts->row_bytes, bytes,
-                            size, err));
-    /* Present these rows as a file of their own. */
-    ply_header header = parts->header;
-    header.element_count = 1;
-    header.elements[0].count = count;
-    header.data_at = 0;
-    const source_file file = {parts->file.name, bytes, size};
     part_rows part = {.rows = {out, parts->rest_count, parts->has_filter}, .kept = kept};
+    memcpy(out->origin, parts->origin, sizeof out->origin);
     out->count = 0;
     out->sh_degree = parts->sh_degree;
-    return ply_read_rows(&file, &header, 0, parts->columns,
-                         FIXED_COLUMNS + parts->rest_count + parts->has_filter, add_part_row, &part, err);
+    return read_rows(parts, first, count, bytes, FIXED_COLUMNS + parts->rest_count + parts->has_filter,
+                     add_part_row, &part, err);
 }
 
 void gaussian_ply_close(gaussian_ply_parts *parts)

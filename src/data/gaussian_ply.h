@@ -33,7 +33,8 @@ static inline void gaussian_ply_put_near(sink *s, const gaussian_cloud *cloud)
  * colour = max(0, 0.5 + sum sh_k Y_k). A row is dropped when a value is NaN or infinite, with two exceptions
  * that exporters do write: an opacity logit of +-inf means 1 or 0, and a log-scale of -inf means a flat axis.
  * A log-scale above GAUSSIAN_SCALE_LOG_LIMIT also drops the row. Mip-Splatting's filter_3D, f, turns scales s
- * into sqrt(s^2 + f^2) and scales the opacity so that the integral stays the same.
+ * into sqrt(s^2 + f^2) and scales the opacity so that the integral stays the same. If x is a double, the
+ * cloud has an origin: the median of a sample of the means, rounded to whole numbers.
  *
  * @param out [out] free with gaussian_cloud_free(); zeroed on failure
  * @return GBT_OK; GBT_ERR_FORMAT also when no Gaussian remains; GBT_ERR_NO_MEMORY
@@ -52,7 +53,8 @@ typedef struct gaussian_ply_parts {
     int sh_degree;
     bool antialiased; /* as in gaussian_cloud */
     float near;
-    large_file file; /* internal, as all below */
+    double origin[3]; /* of the Gaussians of all parts */
+    large_file file;  /* internal, as all below */
     unsigned char *head;
     ply_header header;
     int columns[PLY_MAX_COLUMNS + 1];
@@ -68,8 +70,8 @@ gbt_status gaussian_ply_open(const char *path, gaussian_ply_parts *out, gbt_erro
  * Rows [first, first + count), checked as gaussian_ply_read() does.
  *
  * @param bytes [in,out] room for count * row_bytes
- * @param out   [in,out] has room for `count`; its Gaussians are replaced, its counts of dropped and corrected
- *                       rows are increased
+ * @param out   [in,out] has room for `count`; its Gaussians and its origin are replaced, its counts of
+ *                       dropped and corrected rows are increased
  * @param kept  [out]    [count] for each Gaussian in `out`, its row relative to `first`
  * Threads: any, with distinct arrays.
  */

@@ -7,6 +7,7 @@
 #include "base/rng.h"
 #include "base/vec.h"
 #include "cells/view.h"
+#include "data/bytes.h"
 #include "data/gaussian_file.h"
 #include "frame/frame.h"
 
@@ -68,14 +69,11 @@ typedef struct both {
     float variance;
 } both;
 
-/* Writes the cloud, which is gone then, and opens it both ways. */
-static void open_both(both *b, gaussian_cloud *cloud)
+/* Opens the file both ways. */
+static void open_written(both *b)
 {
-    static const double nowhere[3] = {0, 0, 0};
     double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
     memset(b, 0, sizeof *b);
-    assert_ok(gaussian_file_write(ply, cloud, nowhere, NULL));
-    gaussian_cloud_free(cloud);
     assert_ok(gaussian_file_read(ply, &b->cloud, NULL));
     for (size_t i = 0; i < 3 * b->cloud.count; i++) {
         low[i % 3] = fmin(low[i % 3], (double)b->cloud.mean[i]);
@@ -87,11 +85,20 @@ static void open_both(both *b, gaussian_cloud *cloud)
     assert_ok(cell_store_make(ply, test_folder, plenty, CHUNK_ROWS, &b->store, NULL));
     assert_int_equal(b->store.count, b->cloud.count);
     for (int k = 0; k < 3; k++)
-        assert_true(b->store.origin[k] == b->middle[k]);
+        assert_true(b->store.origin[k] == b->cloud.origin[k] + b->middle[k]);
     b->settings = trace_settings_default();
     b->settings.background[1] = 0.3f;
     b->variance = 0.25f;
     b->drawer.cell_bytes = 340 * 400;
+}
+
+/* Writes the cloud, which is gone then, and opens it. */
+static void open_both(both *b, gaussian_cloud *cloud)
+{
+    static const double nowhere[3] = {0, 0, 0};
+    assert_ok(gaussian_file_write(ply, cloud, nowhere, NULL));
+    gaussian_cloud_free(cloud);
+    open_written(b);
 }
 
 static void close_both(both *b)
@@ -242,6 +249,47 @@ static void far_from_the_origin(void **state) /* A5 */
     for (size_t i = 0; i < cloud.count; i++)
         cloud.mean[3 * i] += 40000;
     open_both(&b, &cloud);
+    const gbt_camera camera = camera_at(8, 2, 1);
+    check_same(&b, &camera, rounding);
+    close_both(&b);
+}
+
+/* Map coordinates as doubles, of which floats would keep half a unit. */
+static void means_in_double(void **state)
+{
+    (void)state;
+    static const double place[3] = {691234.25, 5334567.5, 80.75};
+    static const char *const names[] = {"x",      "y",       "z",       "f_dc_0",  "f_dc_1",
+                                        "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
+                                        "rot_0",  "rot_1",   "rot_2",   "rot_3"};
+    both b;
+    gaussian_cloud c;
+    sink s = {0};
+    random_cloud(&c, 1500);
+    sink_put_text(&s, "ply\nformat binary_little_endian 1.0\nelement vertex 1500\n");
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        char line[64];
+        snprintf(line, sizeof line, "property %s %s\n", k < 3 ? "double" : "float", names[k]);
+        sink_put_text(&s, line);
+    }
+    sink_put_text(&s, "end_header\n");
+    for (size_t i = 0; i < c.count; i++) {
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f64(&s, (double)c.mean[3 * i + k] + place[k]);
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f32(&s, c.sh[48 * i + k]);
+        sink_put_f32(&s, logf(c.opacity[i] / (1 - c.opacity[i])));
+        for (size_t k = 0; k < 3; k++)
+            sink_put_f32(&s, c.scale_log[3 * i + k]);
+        for (size_t k = 0; k < 4; k++)
+            sink_put_f32(&s, c.quat[4 * i + k]);
+    }
+    assert_ok(sink_write(&s, ply));
+    open_written(&b);
+    for (size_t i = 0; i < 3 * c.count; i++)
+        assert_true(fabs((double)b.cloud.mean[i] + b.store.origin[i % 3] - place[i % 3] - (double)c.mean[i]) <
+                    1e-6);
+    gaussian_cloud_free(&c);
     const gbt_camera camera = camera_at(8, 2, 1);
     check_same(&b, &camera, rounding);
     close_both(&b);
@@ -615,6 +663,7 @@ int main(void)
         cmocka_unit_test(camera_inside),
         cmocka_unit_test(many_in_one_place),
         cmocka_unit_test(far_from_the_origin),
+        cmocka_unit_test(means_in_double),
         cmocka_unit_test(one_far_from_the_others),
         cmocka_unit_test(fog),
         cmocka_unit_test(opaque_stacks),

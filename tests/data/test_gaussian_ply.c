@@ -201,6 +201,64 @@ static void filter_is_part_of_a_scale(void **state)
     gaussian_cloud_free(&part);
 }
 
+/* Map coordinates as doubles, after a row that is not usable and one far away; whole and by parts. Floats are
+   as they are. */
+static void means_in_double(void **state)
+{
+    (void)state;
+    enum { ROWS = 3000, FLOATS = 11 };
+    static const char *const names[3 + FLOATS] = {"x",      "y",       "z",       "f_dc_0",  "f_dc_1",
+                                                  "f_dc_2", "opacity", "scale_0", "scale_1", "scale_2",
+                                                  "rot_0",  "rot_1",   "rot_2",   "rot_3"};
+    static unsigned char bytes[ROWS * (3 * sizeof(double) + FLOATS * sizeof(float))];
+    static uint32_t kept[ROWS];
+    static double means[ROWS][3];
+    for (size_t i = 0; i < ROWS; i++) {
+        means[i][0] = i == 0 ? (double)NAN : i == 1 ? 1e9 : 691234.0625 + 0.01 * (double)i;
+        means[i][1] = 5334567.123 - 0.003 * (double)i;
+        means[i][2] = -0.1;
+    }
+    for (int is_double = 0; is_double < 2; is_double++) {
+        sink s = {0};
+        sink_put_text(&s, "ply\nformat binary_little_endian 1.0\nelement vertex 3000\n");
+        for (int k = 0; k < 3 + FLOATS; k++) {
+            sink_put_text(&s, k < 3 && is_double ? "property double " : "property float ");
+            sink_put_text(&s, names[k]);
+            sink_put_text(&s, "\n");
+        }
+        sink_put_text(&s, "end_header\n");
+        for (size_t i = 0; i < ROWS; i++) {
+            for (size_t k = 0; k < 3; k++)
+                if (is_double)
+                    sink_put_f64(&s, means[i][k]);
+                else
+                    sink_put_f32(&s, (float)means[i][k]);
+            for (int k = 0; k < FLOATS; k++)
+                sink_put_f32(&s, 0.5f);
+        }
+        assert_ok(file_write_atomic(in_folder("d.ply"), s.bytes, s.size, &assert_ok_err_));
+        sink_free(&s);
+        gaussian_cloud whole, part;
+        gaussian_ply_parts parts;
+        assert_ok(gaussian_file_read(in_folder("d.ply"), &whole, &assert_ok_err_));
+        assert_ok(gaussian_ply_open(in_folder("d.ply"), &parts, &assert_ok_err_));
+        assert_ok(gaussian_cloud_alloc(&part, ROWS, &assert_ok_err_));
+        assert_ok(gaussian_ply_part(&parts, 0, ROWS, bytes, &part, kept, &assert_ok_err_));
+        assert_true(whole.count == ROWS - 1 && part.count == ROWS - 1);
+        assert_memory_equal(whole.mean, part.mean, 3 * whole.count * sizeof *whole.mean);
+        for (size_t k = 0; k < 3; k++) {
+            const double origin = whole.origin[k];
+            assert_true(origin == part.origin[k] && origin == parts.origin[k] && origin == round(origin));
+            assert_true(is_double || origin == 0);
+            for (size_t i = 1; is_double && i < whole.count; i++)
+                assert_true(fabs((double)whole.mean[3 * i + k] + origin - means[i + 1][k]) < 1e-6);
+        }
+        gaussian_ply_close(&parts);
+        gaussian_cloud_free(&whole);
+        gaussian_cloud_free(&part);
+    }
+}
+
 static void refused(sink *s, const char *says)
 {
     gaussian_cloud cloud;
@@ -348,6 +406,7 @@ int main(void)
             (struct CMUnitTest){.name = row_cases[i].name, .test_func = rows, .initial_state = &row_cases[i]};
     const struct CMUnitTest fixed[] = {
         cmocka_unit_test(layout_of_each_degree),
+        cmocka_unit_test_setup_teardown(means_in_double, folder_make, folder_remove),
         cmocka_unit_test_setup_teardown(filter_is_part_of_a_scale, folder_make, folder_remove),
         cmocka_unit_test(missing_properties),
         cmocka_unit_test(wrong_counts_of_rest),

@@ -179,8 +179,10 @@ gbt_status archive_take_first(const source_file *file, const char *ending, archi
             continue;
         status = take(archive, file, member, bytes, size, err);
         snprintf(name, name_size, "%s: %s", file->name, member);
-        if (status == GBT_OK && !wanted(&(source_file){name, *bytes, *size}))
-            mem_free(*bytes), *bytes = NULL;
+        if (status == GBT_OK && !wanted(&(source_file){name, *bytes, *size})) {
+            mem_free(*bytes);
+            *bytes = NULL;
+        }
     }
     zip_discard(archive);
     return status;

@@ -91,6 +91,17 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
         args->valid[0] = 0;
 }
 
+gbt_status mesh_check_triangles(const uint32_t *triangles, size_t triangle_count, size_t vertex_count,
+                                gbt_error *err)
+{
+    for (size_t i = 0; i < 3 * triangle_count; i++)
+        if (triangles[i] >= vertex_count)
+            return base_fail(err, GBT_ERR_ARGUMENT,
+                             "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3,
+                             vertex_count, triangles[i]);
+    return GBT_OK;
+}
+
 static gbt_status check_mesh(const float *vertices, size_t vertex_count, const uint32_t *triangles,
                              size_t triangle_count, gbt_error *err)
 {
@@ -103,12 +114,7 @@ static gbt_status check_mesh(const float *vertices, size_t vertex_count, const u
             return base_fail(err, GBT_ERR_ARGUMENT,
                              "mesh: vertex %zu: bad coordinate (wanted |x| <= %g, got %g)", i / 3,
                              (double)MESH_COORDINATE_LIMIT, (double)vertices[i]);
-    for (size_t i = 0; i < 3 * triangle_count; i++)
-        if (triangles[i] >= vertex_count)
-            return base_fail(err, GBT_ERR_ARGUMENT,
-                             "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3,
-                             vertex_count, triangles[i]);
-    return GBT_OK;
+    return mesh_check_triangles(triangles, triangle_count, vertex_count, err);
 }
 
 static gbt_status fill_scene(mesh_tree *tree, RTCDevice device, const float *vertices, size_t vertex_count,

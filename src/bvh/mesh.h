@@ -31,6 +31,10 @@ typedef struct mesh_tree mesh_tree; /* immutable once built; rays may be traced 
 gbt_status mesh_tree_build(const float *vertices, size_t vertex_count, const uint32_t *triangles,
                            size_t triangle_count, mesh_tree **out, gbt_error *err);
 
+/** GBT_ERR_ARGUMENT when a vertex number is not below `vertex_count`; part of mesh_tree_build(). */
+gbt_status mesh_check_triangles(const uint32_t *triangles, size_t triangle_count, size_t vertex_count,
+                                gbt_error *err);
+
 typedef struct mesh_hit {
     double u, v; /* the point is (1 - u - v) a + u b + v c for the triangle (a, b, c); at an edge it may be
                     outside by Embree's rounding */

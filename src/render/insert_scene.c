@@ -33,6 +33,7 @@ gbt_status insert_add(insert_scene *in, const insert_object *object, const float
     if (vertex_first + vertex_count >= UINT32_MAX)
         return base_fail(err, GBT_ERR_ARGUMENT, "mesh: %zu vertices (wanted fewer than 2^32 - 1)",
                          vertex_first + vertex_count);
+    GBT_TRY(mesh_check_triangles(triangles, triangle_count, vertex_count, err));
     GBT_TRY(mem_reserve((void **)&in->objects, &in->object_capacity, in->object_count, in->object_count + 1,
                         sizeof *in->objects, "objects", err));
     GBT_TRY(mem_reserve((void **)&in->normals, &in->normal_capacity, vertex_first,
@@ -45,13 +46,8 @@ gbt_status insert_add(insert_scene *in, const insert_object *object, const float
         in->vertices[3 * vertex_first + i] = vertices[i];
         in->normals[3 * vertex_first + i] = 0;
     }
-    for (size_t i = 0; i < 3 * triangle_count; i++) {
-        if (triangles[i] >= vertex_count)
-            return base_fail(err, GBT_ERR_ARGUMENT,
-                             "mesh: triangle %zu: bad vertex number (wanted < %zu, got %u)", i / 3,
-                             vertex_count, triangles[i]);
+    for (size_t i = 0; i < 3 * triangle_count; i++)
         in->triangles[3 * triangle_first + i] = (uint32_t)vertex_first + triangles[i];
-    }
     in->vertex_count += vertex_count;
     in->triangle_count += triangle_count;
     insert_object *added = &in->objects[in->object_count++];

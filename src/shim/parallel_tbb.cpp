@@ -24,7 +24,8 @@ extern "C" {
 #include "base/machine.h"
 }
 
-static std::unique_ptr<tbb::global_control> limit;
+/* Never without a limit, also not at the end of the process: then oneTBB would start threads. */
+static tbb::global_control *limit;
 /* oneTBB's default arena has one slot per processor; more threads than that need an arena of their own. */
 static std::unique_ptr<tbb::task_arena> wide;
 static int thread_count = 0;
@@ -60,9 +61,10 @@ try {
     if (threads < wanted)
         log_warn("only %d of %d threads could be started", threads, wanted);
     wide.reset();
-    limit.reset();
-    limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
-                                                  static_cast<size_t>(threads));
+    auto *const next =
+        new tbb::global_control(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+    delete limit;
+    limit = next;
     if (threads > tbb::info::default_concurrency())
         wide = std::make_unique<tbb::task_arena>(threads);
     thread_count = threads;

@@ -368,6 +368,12 @@ static gbt_status run_in_folder(trainer *t, const char *data, const char *run, c
     return status;
 }
 
+static gbt_status check_data(const char *data, const gbt_train_def *def, gbt_error *err)
+{
+    GBT_TRY(config_check(def, data, err));
+    return scene_need(data, err);
+}
+
 /* Create and lock the folder before any work, so that a run that could not be written does not start. */
 static gbt_status run_with_folder(trainer *t, const char *data, const char *run, const gbt_train_def *def,
                                   config_strings *strings, gbt_error *err)
@@ -378,7 +384,7 @@ static gbt_status run_with_folder(trainer *t, const char *data, const char *run,
     int lock = 0;
     gbt_status status = name_paths(run, &paths, err);
     if (status == GBT_OK && cluster_leads() && !def->resume) /* before any folder is made */
-        status = scene_need(data, err);
+        status = check_data(data, def, err);
     if (status == GBT_OK && cluster_leads())
         status = open_folder(run, def, &paths, err);
     const bool opened = status == GBT_OK && cluster_leads();

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/choice.h"
 #include "base/def.h"
 #include "base/log.h"
 #include "train/rules.h"
@@ -81,4 +82,8 @@ void train_def_warn_unused(const gbt_train_def *d)
                      names[0] != '\0' ? ", " : "", own[i].name);
     if (names[0] != '\0')
         log_warn("%s: ignored with compat", names);
+    if (d->init_count > 0 && d->init != GBT_INIT_ADAPTIVE && d->init != GBT_INIT_RANDOM)
+        log_warn("init_count: ignored with init %s", CHOICE_NAME(GBT_INIT_NAMES, d->init));
+    if (d->splats_until > 0 && d->renderer != GBT_RENDERER_TRACE)
+        log_warn("splats_until: ignored with renderer %s", CHOICE_NAME(GBT_RENDERER_NAMES, d->renderer));
 }

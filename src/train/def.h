@@ -20,7 +20,7 @@ gbt_status train_def_check(const gbt_train_def *d, gbt_error *err);
     A second call changes nothing. */
 void train_def_settle(gbt_train_def *d);
 
-/** Warn about settings that were given but that compat ignores. */
+/** Warn about settings that were given but that compat, the initial anchors or the renderer do not use. */
 void train_def_warn_unused(const gbt_train_def *d);
 
 #endif

@@ -131,20 +131,10 @@ static void to_camera(const gradient_view *v, const float world[3], float cam[3]
                  v->rotation[3 * i + 2] * world[2];
 }
 
-static float dot(const float a[3], const float b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-/* Keep the part of the gradient g of a mean p that is perpendicular to its ray: motion along the ray does not
-   move the Gaussian in the image. */
-static void keep_across(const float p[3], float g[3])
-{
-    const float square = dot(p, p), along = square > 0 ? dot(p, g) / square : 0;
-    for (int i = 0; i < 3; i++)
-        g[i] -= along * p[i];
-}
-
 /* The norm of dL/d(projected mean in NDC), from the gradient g of the mean p, both in camera axes: (z tan_x
    g.x, z tan_y g.y). For lenses that look to all sides, where depth along an axis is meaningless, it is the
-   norm of g, which must be perpendicular to p, times the distance and the image's extent in radians. */
+   norm of the gradient for motion of the mean perpendicular to its ray, times the image's extent in
+   radians. */
 static float screen_gradient(const gradient_view *v, const float p[3], const float g[3])
 {
     const float *tan_half = v->tan_half;
@@ -152,7 +142,10 @@ static float screen_gradient(const gradient_view *v, const float p[3], const flo
         const float x = p[2] * tan_half[0] * g[0], y = p[2] * tan_half[1] * g[1];
         return sqrtf(x * x + y * y);
     }
-    return sqrtf(dot(p, p) * dot(g, g) * tan_half[0] * tan_half[1]);
+    const float far_square = p[0] * p[0] + p[1] * p[1] + p[2] * p[2],
+                g_square = g[0] * g[0] + g[1] * g[1] + g[2] * g[2],
+                along = p[0] * g[0] + p[1] * g[1] + p[2] * g[2];
+    return sqrtf(larger(far_square * g_square - along * along, 0) * tan_half[0] * tan_half[1]);
 }
 
 /* Does the Gaussian's bounding box touch the view cone of a centred pinhole, or, for FRAME_SIGHT_BY_ANCHOR
@@ -184,8 +177,6 @@ static void gather_gradients(const gather_job *job, const gradient_view *view, s
                                                   : !(f->blend_weight[i] > 0))
             continue;
         to_camera(view, gradient, d);
-        if (job->counting == GROWTH_COUNT_BLENDED || !view->looks_forward) /* in the cone: as the reference */
-            keep_across(p, d);
         const uint32_t slot = f->tape.slot[i];
         const size_t at = stat_row(s, f, slot / k_count) * k_count + slot % k_count;
         s->grad_accum[at] += smaller(screen_gradient(view, p, d), gradient_max);

@@ -85,38 +85,6 @@ void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d)
     parallel_blocks(g->count, GAUSSIAN_BLOCK, add_volume_gradient, &job);
 }
 
-typedef struct nearness_job {
-    const gaussians *g;
-    gaussians *d;
-    const float *blend_weight, *eye;
-    double share;
-} nearness_job;
-
-static void add_nearness_gradient(size_t block, size_t begin, size_t end, void *context)
-{
-    (void)block;
-    const nearness_job *job = context;
-    const gaussians *g = job->g;
-    gaussians *d = job->d;
-    const float *eye = job->eye;
-    for (size_t i = begin; i < end; i++) {
-        const float from[3] = {g->mean_x[i] - eye[0], g->mean_y[i] - eye[1], g->mean_z[i] - eye[2]};
-        const double square = (double)from[0] * (double)from[0] + (double)from[1] * (double)from[1] +
-                              (double)from[2] * (double)from[2],
-                     pull = square > 0 ? -job->share * (double)job->blend_weight[i] / square : 0;
-        d->mean_x[i] += (float)(pull * (double)from[0]);
-        d->mean_y[i] += (float)(pull * (double)from[1]);
-        d->mean_z[i] += (float)(pull * (double)from[2]);
-    }
-}
-
-void loss_add_nearness_gradient(const gaussians *g, const float *blend_weight, double share,
-                                const float eye[3], gaussians *d)
-{
-    nearness_job job = {.g = g, .d = d, .blend_weight = blend_weight, .eye = eye, .share = share};
-    parallel_blocks(g->count, GAUSSIAN_BLOCK, add_nearness_gradient, &job);
-}
-
 double loss_of_gaussian(const double field[GAUSSIANS_FIELD_COUNT], double volume_weight)
 {
     enum { SCALE = 3 }; /* of the fields: means come first */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* train/loss.h -- the training loss: the image terms (L1, DSSIM) and the volume term of the Gaussians, with
    weights and gradients (Yang 2026, eq 35). All code that needs the loss of a run uses this file. Of the last
-   two terms there are only gradients: how near the hits of a ray are, and how far apart; the latter is added
-   by the rays' adjoint (trace_settings.spread). */
+   term, how far apart the hits of a ray are, there is only a gradient: the rays' adjoint adds it
+   (trace_settings.spread). */
 #ifndef GBT_TRAIN_LOSS_H
 #define GBT_TRAIN_LOSS_H
 
@@ -32,18 +32,6 @@ double loss_of_gaussians(const gaussians *g, double volume_weight);
 
 /** Adds the gradient of loss_of_gaussians() to `d`. */
 void loss_add_gradient(const gaussians *g, double volume_weight, gaussians *d);
-
-/**
- * Adds to `d` the gradient of -share * sum over Gaussians of W log |mean - eye|, where W, the sum over rays
- * of T alpha, is a constant: means move away from the camera, the more of a picture a Gaussian makes the
- * more.
- *
- * @param blend_weight [in] W, [g->count]
- * @param share        [in] train_rules.nearness / number of rays
- * @param eye          [in] the camera; means at it are not moved
- */
-void loss_add_nearness_gradient(const gaussians *g, const float *blend_weight, double share,
-                                const float eye[3], gaussians *d);
 
 /** Contribution of one Gaussian to loss_of_gaussians() before the mean, for checks in double. `field`: in the
     order of GAUSSIANS_FIELDS. */

@@ -31,7 +31,6 @@ static train_rules own_rules(const gbt_train_def *def)
         .splats_until = def->splats_until,
         .loose_rays = true,
         .spread = 0.1,
-        .nearness = 0.03,
         .leaves_out = true,
         .raises_until = begins_at + SCHEDULE_ADJUST_FROM, /* anchors grow from there */
         .opaque_from = SCHEDULE_OPAQUE_FROM,

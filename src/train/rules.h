@@ -52,8 +52,6 @@ typedef struct train_rules {
                               SCHEDULE_EXACT_FROM */
     double spread;         /* weight in the loss of how far apart the hits of a ray are, with loose rays:
                               trace_settings.spread times the number of rays */
-    double nearness;       /* weight in the loss of how near the hits of a ray are, with loose rays:
-                              loss_add_nearness_gradient() */
     bool leaves_out;       /* a random share of the anchors is left out of each step: schedule_left_out() */
     double raises_until;   /* progress until which the opacities of an offset are raised when their mean is
                               below 0 */

@@ -259,10 +259,6 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     if (t->poses.count > 0)
         GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
     loss_add_gradient(&f->gaussians, volume_weight, &f->d_gaussians);
-    if (train_rules_are_loose(&t->rules, progress))
-        loss_add_nearness_gradient(&f->gaussians, f->blend_weight,
-                                   t->rules.nearness / (double)ray_image_count(&f->rays), f->eye,
-                                   &f->d_gaussians);
     GBT_TRY(frame_backward_anchors(f, &t->anchors, &t->decoder, &gradient->anchors, gradient->networks, err));
     char where[80];
     if (gradient_is_bad(gradient, f, &t->decoder, t->exposures.count > 0 ? r->d_exposure : NULL, where,

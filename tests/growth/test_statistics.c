@@ -141,45 +141,12 @@ static void a_panorama_has_no_front(void **state)
     decoder_free(&d);
 }
 
-/* A gradient along the ray of a mean does not count, whatever the lens: it moves nothing in the image. */
-static void motion_along_the_ray_does_not_count(void **state)
-{
-    (void)state;
-    anchors a = anchors_around();
-    decoder d = random_decoder(OFFSETS, false, 7);
-    for (size_t c = 0; c < CASES; c++) {
-        gathered g;
-        gather(&cases[c], &a, &d, GROWTH_COUNT_BLENDED, &g);
-        growth_stats pushed = {0};
-        assert_ok(growth_stats_resize(&pushed, ANCHORS, OFFSETS, NULL));
-        const gaussians *at = &g.f.gaussians;
-        gaussians *gradient = &g.f.d_gaussians;
-        double largest = 0;
-        for (size_t i = 0; i < at->count; i++) {
-            gradient->mean_x[i] -= 1e-3f * at->mean_x[i]; /* the camera is at the origin */
-            gradient->mean_y[i] -= 1e-3f * at->mean_y[i];
-            gradient->mean_z[i] -= 1e-3f * at->mean_z[i];
-        }
-        growth_stats_gather(&pushed, &g.f, GROWTH_BY_SHARE, GROWTH_COUNT_BLENDED, 0.01f);
-        for (size_t slot = 0; slot < ANCHORS * OFFSETS; slot++) {
-            largest = fmax(largest, (double)g.s.grad_accum[slot]);
-            assert_true(fabs((double)(pushed.grad_accum[slot] - g.s.grad_accum[slot])) <= 1e-6);
-        }
-        assert_true(largest > 1e-4);
-        growth_stats_free(&pushed);
-        free_gathered(&g);
-    }
-    anchors_free(&a);
-    decoder_free(&d);
-}
-
 int main(void)
 {
-    struct CMUnitTest tests[CASES + 2];
+    struct CMUnitTest tests[CASES + 1];
     for (size_t i = 0; i < CASES; i++)
         tests[i] = (struct CMUnitTest){
             .name = cases[i].name, .test_func = what_rays_blended_is_counted, .initial_state = &cases[i]};
     tests[CASES] = (struct CMUnitTest)cmocka_unit_test(a_panorama_has_no_front);
-    tests[CASES + 1] = (struct CMUnitTest)cmocka_unit_test(motion_along_the_ray_does_not_count);
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

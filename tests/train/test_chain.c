@@ -416,42 +416,6 @@ static void threads_give_the_same_bits(void **state)
     parallel_set_threads(before);
 }
 
-/* The nearness term with the weights of a real view, held constant, against differences in double. */
-static void nearness_gradient_agrees_with_differences(void **state)
-{
-    (void)state;
-    view v;
-    make_view(&v, 41, false);
-    assert_ok(frame_backward_gaussians(&v.f, &v.photo, NULL));
-    const gaussians *g = &v.f.gaussians;
-    gaussians *d = &v.f.d_gaussians;
-    const double share = 0.1 / RAYS, step = 1e-6;
-    size_t moved = 0;
-    for (size_t i = 0; i < g->count; i++)
-        d->mean_x[i] = d->mean_y[i] = d->mean_z[i] = 0;
-    loss_add_nearness_gradient(g, v.f.blend_weight, share, v.f.eye, d);
-    for (size_t i = 0; i < g->count; i++) {
-        const double mean[3] = {(double)g->mean_x[i], (double)g->mean_y[i], (double)g->mean_z[i]},
-                     got[3] = {(double)d->mean_x[i], (double)d->mean_y[i], (double)d->mean_z[i]};
-        for (int k = 0; k < 3; k++) {
-            double loss[2];
-            for (int side = 0; side < 2; side++) {
-                double square = 0;
-                for (int c = 0; c < 3; c++) {
-                    const double from = mean[c] - (double)v.f.eye[c] + (c == k ? (side - 0.5) * step : 0);
-                    square += from * from;
-                }
-                loss[side] = -share * (double)v.f.blend_weight[i] * 0.5 * log(square);
-            }
-            const double wanted = (loss[1] - loss[0]) / step;
-            assert_true(fabs(got[k] - wanted) <= 1e-5 * fabs(wanted) + 1e-10);
-        }
-        moved += v.f.blend_weight[i] > 0;
-    }
-    assert_true(moved > 5);
-    view_free(&v);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -459,7 +423,6 @@ int main(void)
         cmocka_unit_test(no_parameter_is_forgotten),
         cmocka_unit_test(float_chain_agrees_with_double),
         cmocka_unit_test(threads_give_the_same_bits),
-        cmocka_unit_test(nearness_gradient_agrees_with_differences),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

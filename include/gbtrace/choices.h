@@ -50,8 +50,8 @@ typedef enum gbt_alpha {
 typedef enum gbt_background {
     GBT_BACKGROUND_CONSTANT, /* one colour: the one that transparent photos are composited onto, otherwise the
                                 mean of the sparse points */
-    GBT_BACKGROUND_SKY       /* a learned colour per direction: spherical harmonics to degree 3. Not with
-                                photos that are transparent in places */
+    GBT_BACKGROUND_SKY       /* a learned colour per direction above the horizon: spherical harmonics to
+                                degree 3. Not with photos that are transparent in places */
 } gbt_background;
 #define GBT_BACKGROUND_NAMES "constant|sky"
 

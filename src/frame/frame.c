@@ -304,6 +304,7 @@ gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6]
 
 typedef struct sky_job {
     const frame *f;
+    const sky *sky;
     const image *d_image;
     double (*sums)[SH_COUNT][3]; /* per block */
 } sky_job;
@@ -317,17 +318,18 @@ static void sum_sky(size_t block, size_t begin, size_t end, void *context)
         float y[SH_COUNT];
         if (!(through > least_through))
             continue;
-        sky_basis(job->f->rays.dir + 3 * i, y);
+        sky_basis(job->sky, job->f->rays.dir + 3 * i, y);
         for (int c = 0; c < 3; c++)
             for (int k = 0; k < SH_COUNT; k++)
                 sum[k][c] += (double)(through * d[c] * y[k]);
     }
 }
 
-gbt_status frame_backward_sky(const frame *f, const image *d_image, double d_sky[SH_COUNT][3], gbt_error *err)
+gbt_status frame_backward_sky(const frame *f, const sky *behind, const image *d_image,
+                              double d_sky[SH_COUNT][3], gbt_error *err)
 {
     const size_t count = ray_image_count(&f->rays), blocks = parallel_block_count(count, SKY_BLOCK);
-    sky_job job = {f, d_image, mem_calloc(blocks, sizeof *job.sums, "gradient of the sky", err)};
+    sky_job job = {f, behind, d_image, mem_calloc(blocks, sizeof *job.sums, "gradient of the sky", err)};
     if (job.sums == NULL)
         return GBT_ERR_NO_MEMORY;
     parallel_blocks(count, SKY_BLOCK, sum_sky, &job);

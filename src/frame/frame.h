@@ -148,10 +148,10 @@ gbt_status frame_backward_gaussians(frame *f, const image *d_image, gbt_error *e
 gbt_status frame_backward_pose(frame *f, frame_subject subject, double d_pose[6], gbt_error *err);
 
 /** Gradient by the background's colour and the sky's harmonics (base/sky.h), after the last
-    frame_render(keep_tape) with a sky that varies. Clamping of colours is ignored (straight-through). Pixels
-    with a transmittance below 0.01 are left out. */
-gbt_status frame_backward_sky(const frame *f, const image *d_image, double d_sky[SH_COUNT][3],
-                              gbt_error *err);
+    frame_render(keep_tape) with this sky, which must vary. Clamping of colours is ignored (straight-through).
+    Pixels with a transmittance below 0.01 are left out. */
+gbt_status frame_backward_sky(const frame *f, const sky *behind, const image *d_image,
+                              double d_sky[SH_COUNT][3], gbt_error *err);
 
 /** Second part of the adjoint for anchors: f->d_gaussians, with anything that the caller added to it ->
     d_anchors (rows of f->visible are added to; or only these rows, see decode_backward()) and d_params (added

@@ -29,6 +29,10 @@ static void add_scene(container_writer *w, const model *m)
                                                m->background[1], m->background[2]});
     if (m->sky.varies)
         container_add(w, "scene.sky", CONTAINER_F32, 2, (size_t[]){SKY_HARMONICS, 3}, m->sky.harmonic);
+    if (m->sky.varies && m->sky.has_horizon) {
+        container_add_small(w, "scene.sky_up", CONTAINER_F32, 3, m->sky.up);
+        container_add_small(w, "scene.sky_ground", CONTAINER_F32, 3, m->sky.ground);
+    }
     container_add_text(w, "scene.data_folder", m->data_folder);
     container_add_text(w, "train.config", m->config);
     container_add_small(w, "train.iterations", CONTAINER_U64, 1, &m->iterations);
@@ -94,6 +98,8 @@ static gbt_status check_model(const char *path, const model *m, gbt_status failu
         {"scene.numbers", &m->t_near, 1},
         {"scene.numbers", m->background, 3},
         {"scene.sky", m->sky.harmonic[0], m->sky.varies ? 3 * SKY_HARMONICS : 0},
+        {"scene.sky_up", m->sky.up, 3},
+        {"scene.sky_ground", m->sky.ground, 3},
         {"decoder.numbers", &d->distance_scale, 1},
     };
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
@@ -284,7 +290,8 @@ static gbt_status read_coded(const container *c, model *m, gbt_error *err)
     return model_decode(c, m->decoder.has_distance, m, err);
 }
 
-/* The section is missing in models with a background of one colour. */
+/* The sections are missing in models with a background of one colour, those of the horizon also in models
+   whose sky is all around. */
 static gbt_status read_sky(const container *c, sky *out, gbt_error *err)
 {
     const void *data;
@@ -293,7 +300,11 @@ static gbt_status read_sky(const container *c, sky *out, gbt_error *err)
     GBT_TRY(container_find(c, "scene.sky", CONTAINER_F32, 2, (size_t[]){SKY_HARMONICS, 3}, &data, err));
     memcpy(out->harmonic, data, sizeof out->harmonic);
     out->varies = true;
-    return GBT_OK;
+    out->has_horizon = container_section_named(c, "scene.sky_up") != NULL;
+    if (!out->has_horizon)
+        return GBT_OK;
+    GBT_TRY(container_get(c, "scene.sky_up", CONTAINER_F32, 3, out->up, err));
+    return container_get(c, "scene.sky_ground", CONTAINER_F32, 3, out->ground, err);
 }
 
 static gbt_status read_scene(const container *c, model *m, gbt_error *err)

@@ -128,10 +128,11 @@ void tile_load_rays(const ray_image *rays, const trace_settings *s, int x0, int 
     }
 }
 
-/* The background of a pixel without a ray: the one colour, cut to [0, 1] where there is a sky. */
+/* The background of a pixel without a ray: the one colour, cut to [0, 1] where there is a sky, or the ground
+   below it. */
 static float plain_background(const trace_settings *s, size_t c)
 {
-    const float color = s->background[c];
+    const float color = s->sky.varies && s->sky.has_horizon ? s->sky.ground[c] : s->background[c];
     return !s->sky.varies ? color : color < 0 ? 0 : color > 1 ? 1 : color;
 }
 

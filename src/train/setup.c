@@ -13,6 +13,7 @@
 #include "base/vec.h"
 #include "bvh/points.h"
 #include "gbtrace/cluster.h"
+#include "train/horizon.h"
 #include "train/camera_sees.h"
 #include "train/config.h"
 #include "train/def.h"
@@ -217,9 +218,14 @@ static void choose_background(trainer *t)
             mean_color(&t->scene.points, t->settings.background);
         t->settings.sky.varies = wants_sky;
     }
-    if (t->settings.sky.varies) /* a learned sky is what the photos show */
+    sky *s = &t->settings.sky;
+    if (s->varies) {
+        s->has_horizon = horizon_find(&t->scene, t->train_views, t->train_count, s->up);
+        memcpy(s->ground, t->settings.background, sizeof s->ground);
+    }
+    if (s->varies && !s->has_horizon) /* all around there is what the photos show */
         t->rules.opaque_from = HUGE_VAL;
-    else if (wants_sky)
+    else if (wants_sky && !s->varies)
         log_warn("%s: no sky is learned: %s", t->scene.folder,
                  given ? "photos with an alpha channel are composited on one colour"
                        : "compat uses one colour");

@@ -60,12 +60,13 @@ static photo_pick pick_pixels(const trainer *t, size_t view, uint64_t before)
                         .step = step};
 }
 
-/* Late in a run half of the views get a random background colour: only opaque surfaces then give the right
-   image on all backgrounds. Returns true for a random background. */
+/* Late in a run half of the views get a random background colour, or below a sky a random ground: only opaque
+   surfaces then give the right image on all backgrounds. Returns true for a random colour. */
 static bool pick_background(const trainer *t, uint64_t before, float out[3])
 {
+    const trace_settings *s = &t->settings;
     uint32_t words[4];
-    memcpy(out, t->settings.background, sizeof t->settings.background);
+    memcpy(out, s->sky.has_horizon ? s->sky.ground : s->background, sizeof s->background);
     if (pace_progress(&t->pace, t->step) < t->rules.opaque_from)
         return false;
     rng_philox(t->def.seed, RNG_STREAM_BACKGROUND, before, words);
@@ -165,7 +166,8 @@ static trace_settings settings_of(const trainer *t, const step_view *v, double p
 {
     trace_settings settings = t->settings;
     settings.t_near = step_view_near(t, v);
-    memcpy(settings.background, v->background, sizeof settings.background);
+    memcpy(settings.sky.has_horizon ? settings.sky.ground : settings.background, v->background,
+           sizeof v->background);
     if (train_rules_are_loose(&t->rules, progress)) {
         settings.alpha_min = SCHEDULE_ALPHA_MIN;
         settings.transmittance_min = SCHEDULE_T_MIN;
@@ -255,7 +257,7 @@ static gbt_status run(trainer *t, step_view *v, gbt_error *err)
     learnables *gradient = alone ? &t->gradient : &v->gradient;
     GBT_TRY(frame_backward_gaussians(f, &v->d_image, err));
     if (t->settings.sky.varies)
-        GBT_TRY(frame_backward_sky(f, &v->d_image, r->d_sky, err));
+        GBT_TRY(frame_backward_sky(f, &settings.sky, &v->d_image, r->d_sky, err));
     if (t->poses.count > 0)
         GBT_TRY(frame_backward_pose(f, frame_neural(&t->anchors, &t->decoder), r->d_pose, err));
     loss_add_gradient(&f->gaussians, volume_weight, &f->d_gaussians);

@@ -44,7 +44,7 @@ typedef struct step_view {
     row_list rows;       /* both, with anchor numbers */
     view_outcome outcome;
     gbt_camera camera;   /* camera of the pixels that the view uses */
-    float background[3]; /* background colour of this view */
+    float background[3]; /* background colour of this view, or colour below its sky */
     const unsigned char *valid;
     stage_time photo_time, compare_time; /* of the last step */
     double seconds;                      /* wall time of everything but reading the photo */

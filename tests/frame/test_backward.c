@@ -32,12 +32,14 @@ static void make_cloud(const gbt_camera *camera, gaussian_cloud *c)
 }
 
 /* Nothing that jumps when things move a little. */
-static trace_settings smooth_settings(void)
+static trace_settings smooth_settings(const gbt_camera *camera)
 {
     trace_settings s = trace_settings_default();
     s.alpha_min = 1e-6f;
     s.transmittance_min = 1e-7f;
-    s.sky.varies = true;
+    s.sky = (sky){.varies = true, .has_horizon = true, .ground = {0.2f, 0.4f, 0.6f}};
+    for (size_t k = 0; k < 3; k++) /* the horizon crosses the picture */
+        s.sky.up[k] = (float)-camera->rotation[3 + k];
     for (int k = 0; k < 3 * SH_COUNT; k++)
         if (k < 3)
             s.background[k] = 0.5f;
@@ -59,13 +61,14 @@ static double loss_of(frame *f, const gaussian_cloud *cloud, const gbt_camera *c
 }
 
 /* All gradients of the last loss_of(). */
-static void backward(frame *f, const gaussian_cloud *cloud, double pose[6], double d_sky[SH_COUNT][3])
+static void backward(frame *f, const gaussian_cloud *cloud, const sky *behind, double pose[6],
+                     double d_sky[SH_COUNT][3])
 {
     image d_image;
     assert_ok(image_alloc(&d_image, W, H, 3, NULL));
     for (size_t i = 0; i < VALUES; i++)
         d_image.pixels[i] = (float)weight(i);
-    assert_ok(frame_backward_sky(f, &d_image, d_sky, NULL));
+    assert_ok(frame_backward_sky(f, behind, &d_image, d_sky, NULL));
     assert_ok(frame_backward_gaussians(f, &d_image, NULL));
     assert_ok(frame_backward_pose(f, frame_plain(cloud), pose, NULL));
     image_free(&d_image);
@@ -80,11 +83,11 @@ static void gradients_agree_with_differences(void **state)
     static const gbt_renderer renderers[] = {GBT_RENDERER_TRACE, GBT_RENDERER_RASTER};
     for (int r = 0; r < 2; r++) {
         frame f = {.draw = {.renderer = renderers[r], .footprint = 0.1f}};
-        trace_settings s = smooth_settings(), one_color = s;
+        trace_settings s = smooth_settings(&camera), one_color = s;
         one_color.sky.varies = false; /* the pose's gradient leaves out that the sky turns */
         double pose[6], unused[6], d_sky[SH_COUNT][3], off = 0, all = 0, off_sky = 0, all_sky = 0;
         loss_of(&f, &cloud, &camera, &s);
-        backward(&f, &cloud, unused, d_sky);
+        backward(&f, &cloud, &s.sky, unused, d_sky);
         for (int k = 0; k < 3 * SH_COUNT; k++) {
             const float h = 0.01f; /* the loss is linear in them */
             float *value = k < 3 ? &s.background[k] : &s.sky.harmonic[k / 3 - 1][k % 3], keep = *value;
@@ -97,7 +100,7 @@ static void gradients_agree_with_differences(void **state)
             all_sky += wanted * wanted;
         }
         loss_of(&f, &cloud, &camera, &one_color);
-        backward(&f, &cloud, pose, d_sky); /* of the same transmittances */
+        backward(&f, &cloud, &s.sky, pose, d_sky); /* of the same transmittances */
         for (int k = 0; k < 6; k++) {
             double motion[6] = {0}, loss[2];
             for (int side = 0; side < 2; side++) {

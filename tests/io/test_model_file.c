@@ -35,6 +35,9 @@ static void make_model(model *m, size_t count, int offset_count, bool has_distan
             m->anchor_pixel[i] = rng_uniform(7, 5, i);
         m->sky.varies = true;
         fill_values(m->sky.harmonic[0], 3 * SKY_HARMONICS, 6);
+        m->sky.has_horizon = true;
+        fill_values(m->sky.up, 3, 7);
+        fill_values(m->sky.ground, 3, 8);
     }
     assert_ok(decoder_init(&m->decoder, offset_count, has_distance, 9, NULL));
     m->decoder.distance_scale = 0.25f;
@@ -67,6 +70,9 @@ static void check_same(const model *a, const model *b)
     assert_memory_equal(a->background, b->background, sizeof a->background);
     assert_int_equal(a->sky.varies, b->sky.varies);
     assert_memory_equal(a->sky.harmonic, b->sky.harmonic, sizeof a->sky.harmonic);
+    assert_int_equal(a->sky.has_horizon, b->sky.has_horizon);
+    assert_memory_equal(a->sky.up, b->sky.up, sizeof a->sky.up);
+    assert_memory_equal(a->sky.ground, b->sky.ground, sizeof a->sky.ground);
     assert_true(a->voxel_size == b->voxel_size && a->extent == b->extent && a->t_near == b->t_near);
     assert_string_equal(a->data_folder, b->data_folder);
     assert_string_equal(a->config, b->config);

@@ -255,7 +255,7 @@ static trace_settings with_background(void)
     s.background[0] = 0.3f;
     s.background[1] = 0.6f;
     s.background[2] = 0.1f;
-    s.sky.varies = true;
+    s.sky = (sky){.varies = true, .has_horizon = true, .up = {0.6f, -0.8f, 0}, .ground = {0.8f, 0.2f, 0.4f}};
     for (int k = 0; k < 3 * SKY_HARMONICS; k++)
         s.sky.harmonic[k / 3][k % 3] = 0.1f * cosf(1.7f * (float)k);
     return s;
@@ -979,7 +979,7 @@ static void rays_that_are_none(void **state)
             is_none = is_none || none[k] == i;
         assert_true(is_none == (T[i] == 1));
         for (size_t c = 0; c < 3; c++)
-            assert_true(is_none == (t.rgb.pixels[3 * i + c] == s.background[c]));
+            assert_true(is_none == (t.rgb.pixels[3 * i + c] == s.sky.ground[c]));
     }
     assert_true(isfinite(t.d.mean_x[0]) && isfinite(t.d.scale_z[0]) && isfinite(t.d.opacity[0]));
     trace_scene_free(&scene);

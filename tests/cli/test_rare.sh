@@ -35,8 +35,8 @@ holds "times that fall" 2 '^error: --eval-at: "1s" (wanted up to [0-9]* increasi
 holds "a time that is none" 2 '^error: --eval-at: "soon"' train made -o none --eval-at soon
 holds "a list that is too long" 2 '^error: --eval-at: the list is too long' train made -o none --eval-at "$(printf '%0600d' 1)"
 holds "more anchors at the start than are wanted" 0 '^warning: max_anchors: the sparse points alone make [0-9]* anchors, so none is added in training (the limit is 5)$' train made -o many --iterations 3 --max-anchors 5
-holds "a setting that the initial anchors do not use" 0 '^warning: init_count: ignored with init gb$' train made -o counted --iterations 3 --init-count 0.5
-holds "a setting that the renderer does not use" 0 '^warning: splats_until: ignored with renderer raster$' train made -o counted --overwrite --iterations 3 --renderer raster --splats-until 0.5
+holds "a setting that the initial anchors do not use" 0 '^warning: init_count: ignored with init gb$' train made -o unheeded --iterations 3 --init-count 0.5
+holds "a setting that the renderer does not use" 0 '^warning: splats_until: ignored with renderer raster$' train made -o unheeded --overwrite --iterations 3 --renderer raster --splats-until 0.5
 holds "settings that compat does not use" 0 '^warning: splats_until, threshold_factor: ignored with compat$' train made -o reference --iterations 3 --compat --splats-until 0.7 --threshold-factor 3
 holds "nothing is said of those that it uses" 0 '^[^w]' train made -o reference --iterations 3 --compat --overwrite && ! grep -q ignored err
 report $? "no warning without reason" "$(cat err)"
